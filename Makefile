@@ -32,6 +32,7 @@ lint: $(PROJECT) $(VENV)/.test $(VENV)/.lint
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/lint-imports
+	rm -rf build/types && mkdir -p build/types && cp -RP build/__editable__.*/fenchel build/types/
 	$(BIN)/pyright
 
 docs: $(PROJECT) $(VENV)/.docs

@@ -1,0 +1,61 @@
+"""The command line: `fenchel COMMAND`, one file per command group.
+
+Exit code 0: done; 1: it failed; 2: misuse, or an input that breaks a rule. Foreseen failures are one line on standard error.
+Everything heavy is imported inside the commands, so that `fenchel --help` answers at once.
+"""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+
+from . import dem, doctor, identify, laws
+from .faults import one_line
+
+__all__ = ["app", "main"]
+
+app = typer.Typer(
+    name="fenchel",
+    add_completion=False,
+    rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from fenchel import __version__
+
+        typer.echo(f"fenchel {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _face(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Print the version and leave."
+    ),
+) -> None:
+    """Constitutive laws from declared potentials, and from grains.
+
+    Units are SI. Stress and strain are positive in tension, unless --signs says otherwise.
+    """
+
+
+for _group in (laws, dem, identify, doctor):
+    _group.register(app)
+
+
+def main(arguments: list[str] | None = None) -> int:
+    """Run the command line on `arguments` (default: those of the process) and return its exit code."""
+    given = sys.argv[1:] if arguments is None else arguments
+    try:
+        code = app(args=given or ["--help"], prog_name="fenchel", standalone_mode=False)
+    except Exception as problem:
+        line, code = one_line(problem)
+        print(line, file=sys.stderr)
+    except KeyboardInterrupt:
+        code = 130
+    return code if isinstance(code, int) else 0

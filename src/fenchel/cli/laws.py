@@ -1,0 +1,140 @@
+"""`fenchel laws`, `show`, `check`: the library, Table 1 of a law, and whether the law is admissible."""
+
+from __future__ import annotations
+
+from enum import StrEnum
+from pathlib import Path
+
+import typer
+
+__all__ = ["Formulation", "Split", "register"]
+
+LAW = typer.Argument(
+    ..., metavar="LAW", help="A name of the library, or file.py:name; such a file is run as the Python that it is."
+)
+
+
+class Formulation(StrEnum):
+    """What drives the law: the strain, or the stress."""
+
+    strain = "strain"
+    stress = "stress"
+
+
+class Split(StrEnum):
+    """Which strain the table is written in: the whole, or its reversible part."""
+
+    total = "total"
+    reversible = "reversible"
+
+
+def register(app: typer.Typer) -> None:
+    """Add the commands of this group to the command line."""
+    app.command("laws")(_laws)
+    app.command("show")(_show)
+    app.command("check")(_check)
+
+
+def _laws(json_wanted: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
+    """The library of laws: name, one line, parameters with units.
+
+    Example: fenchel laws
+    """
+    from fenchel.potentials.library import LAWS
+
+    from .tables import print_json, print_table
+
+    if json_wanted:
+        print_json(
+            {
+                name: {
+                    "description": law.note,
+                    "parameters": {
+                        symbol.name: {
+                            "unit": symbol.unit,
+                            "lower": symbol.lower,
+                            "upper": symbol.upper,
+                            "meaning": symbol.note,
+                        }
+                        for symbol in law.parameters
+                    },
+                }
+                for name, law in LAWS.items()
+            }
+        )
+        return
+    rows = [
+        (name, law.note, ", ".join(f"{symbol.name} [{symbol.unit or '-'}]" for symbol in law.parameters))
+        for name, law in LAWS.items()
+    ]
+    print_table(("law", "what it is", "parameters"), rows)
+
+
+def _show(
+    law: str = LAW,
+    formulation: Formulation = typer.Option(Formulation.strain, "--formulation", help="What drives the law."),
+    split: Split = typer.Option(Split.total, "--split", help="Strain that the table is written in."),
+    latex: bool = typer.Option(False, "--latex", help="Print LaTeX."),
+    json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Table 1 of a law: its potentials, state laws and complementary laws.
+
+    Example: fenchel show sand --formulation strain
+    """
+    from fenchel.errors import InputError
+    from fenchel.potentials import load_law
+
+    from .tables import print_json
+
+    if latex and json_wanted:
+        raise InputError("show prints either --latex or --json: leave one out")
+    table = load_law(law).table(formulation.value, split=split.value)
+    if json_wanted:
+        content = table.json()
+        if isinstance(content, str):
+            typer.echo(content)
+        else:
+            print_json(content)
+    else:
+        typer.echo(table.latex() if latex else table.text())
+
+
+def _check(
+    law: str = LAW,
+    values: list[str] = typer.Option([], "-p", metavar="NAME=VALUE", help="A parameter; may be repeated."),
+    parameters: Path | None = typer.Option(None, "--parameters", metavar="P.toml", help="Parameters from a file."),
+    json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Whether a law is admissible: exit code 0 if proved, 1 if refuted or undecided, 2 if it is not a valid declaration.
+
+    Example: fenchel check von_mises -p E=2e11 -p nu=0.3
+    """
+    from fenchel.potentials import load_law
+
+    from .tables import print_json
+    from .values import parameter_values
+
+    report = load_law(law).check(**parameter_values(values, parameters))
+    verdict = {True: "proved", False: "refuted", None: "undecided"}[report.admissible]
+    conditions = [str(item) for item in report.conditions]
+    reasons = [str(item) for item in report.reasons]
+    counterexample = getattr(report, "counterexample", None)
+    if json_wanted:
+        print_json(
+            {
+                "admissible": report.admissible,
+                "verdict": verdict,
+                "conditions": conditions,
+                "reasons": reasons,
+                "counterexample": None if counterexample is None else str(counterexample),
+            }
+        )
+    else:
+        typer.echo(f"{law}: {verdict}")
+        for head, lines in (("under the conditions", conditions), ("because", reasons)):
+            if lines:
+                typer.echo("\n".join([f"{head}:", *(f"  {line}" for line in lines)]))
+        if counterexample is not None:
+            typer.echo(f"counterexample: {counterexample}")
+    if report.admissible is not True:
+        raise typer.Exit(1)

@@ -1,0 +1,61 @@
+"""What a command prints: a table for people, or the same data as JSON."""
+
+from __future__ import annotations
+
+import json
+import math
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+__all__ = ["number", "print_json", "print_table"]
+
+_WIDTH_OF_A_FILE = 140
+
+
+def print_json(data: Any) -> None:
+    """Print `data` as JSON; a number that JSON has no word for (infinite, not a number) becomes null."""
+    json.dump(_plain(data), sys.stdout, indent=2, ensure_ascii=False, allow_nan=False)
+    sys.stdout.write("\n")
+
+
+def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, title: str | None = None) -> None:
+    """Print rows under column heads; numbers by `number`, everything else as text."""
+    from rich import box
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
+    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    for row in rows:
+        table.add_row(*(Text(number(cell) if isinstance(cell, float) else str(cell)) for cell in row))
+    console.print(table)
+
+
+def number(value: float) -> str:
+    """Six significant digits, without trailing zeros.
+
+    >>> number(1.0e8), number(0.25)
+    ('1e+08', '0.25')
+    """
+    return f"{value:.6g}"
+
+
+def _plain(data: Any) -> Any:
+    if isinstance(data, Mapping):
+        return {str(key): _plain(value) for key, value in data.items()}
+    if isinstance(data, list | tuple | set | frozenset):
+        return [_plain(value) for value in data]
+    if isinstance(data, float) and not math.isfinite(data):
+        return None
+    if data is None or isinstance(data, str | bool | int | float):
+        return data
+    if isinstance(data, Path):
+        return str(data)
+    if hasattr(data, "tolist"):  # numpy arrays and numbers, without importing numpy here
+        return _plain(data.tolist())
+    raise TypeError(f"{type(data).__name__} has no JSON form")
