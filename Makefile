@@ -40,7 +40,7 @@ docs: $(PROJECT) $(VENV)/.docs
 	@echo "The pages are $(abspath docs/_build/html)/index.html"
 
 bench: $(PROJECT) $(VENV)/.test
-	$(BIN)/python -m pytest -q benchmarks --benchmark-only
+	$(BIN)/python -m pytest -q benchmarks/bench_*.py --benchmark-only
 
 validate: $(PROJECT) $(VENV)/.test
 	$(BIN)/python -m pytest -q -m validate
