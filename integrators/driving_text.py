@@ -1,0 +1,185 @@
+"""The parts of a generated module that are the same for every law: the loop over points, and the loop over steps.
+
+They stand in the generated module, not beside it, so that numba binds them to the law's own `point_` and keeps them on disk.
+"""
+
+from __future__ import annotations
+
+__all__ = ["BATCH", "DRIVE"]
+
+BATCH = '''
+
+
+@njit(folder=FOLDER)
+def batch_(eps_, old_, new_, stress_, tangent_, want_, dissipation_, status_, values_):
+    """The step at every point; arrays have the point index first."""
+    c_ = constants_(values_)
+    work_ = np.zeros((WORK_ROWS, 12))
+    last_ = tangent_.shape[0] - 1
+    for m_ in range(eps_.shape[0]):
+        status_[m_], dissipation_[m_] = point_(
+            eps_[m_], old_[m_], new_[m_], stress_[m_], tangent_[min(m_, last_)], want_, work_, c_
+        )
+
+
+@njit(folder=FOLDER)
+def energies_(eps_, state_, psi_, values_):
+    """Free energy at every point."""
+    c_ = constants_(values_)
+    work_ = np.zeros((WORK_ROWS, 12))
+    for m_ in range(eps_.shape[0]):
+        psi_[m_] = energy_(eps_[m_], state_[m_], work_, c_)
+'''
+
+DRIVE = '''
+
+@njit(folder=FOLDER)
+def solve_(matrix_, right_, size_, floor_):
+    """Gaussian elimination with partial pivoting, in place; a pivot below `floor_` is replaced by it."""
+    for k_ in range(size_):
+        best_ = k_
+        for i_ in range(k_ + 1, size_):
+            if abs(matrix_[i_, k_]) > abs(matrix_[best_, k_]):
+                best_ = i_
+        if best_ != k_:
+            for j_ in range(k_, size_):
+                matrix_[k_, j_], matrix_[best_, j_] = matrix_[best_, j_], matrix_[k_, j_]
+            right_[k_], right_[best_] = right_[best_], right_[k_]
+        if abs(matrix_[k_, k_]) < floor_:
+            matrix_[k_, k_] = floor_
+        for i_ in range(k_ + 1, size_):
+            factor_ = matrix_[i_, k_]/matrix_[k_, k_]
+            if factor_ != 0.0:
+                for j_ in range(k_, size_):
+                    matrix_[i_, j_] -= factor_*matrix_[k_, j_]
+                right_[i_] -= factor_*right_[k_]
+    for k_ in range(size_ - 1, -1, -1):
+        for j_ in range(k_ + 1, size_):
+            right_[k_] -= matrix_[k_, j_]*right_[j_]
+        right_[k_] /= matrix_[k_, k_]
+
+
+@njit(folder=FOLDER)
+def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out_state_, out_psi_, out_dissipation_,
+           values_, tolerance_, limit_):
+    """Steps under mixed control: find y with v (sigma(base + z y)) = goal, by damped Newton; returns (failed row, residual, scale).
+
+    The strain increment lies in the span of the columns of `z_`, the stress is tested by the rows of `v_`.
+    """
+    c_ = constants_(values_)
+    work_ = np.zeros((WORK_ROWS, 12))
+    steps_, size_ = base_.shape[0], z_.shape[1]
+    new_ = np.zeros(out_state_.shape[1])
+    sig_, tangent_, elastic_ = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
+    trial_, half_ = np.zeros(6), np.zeros((6, 6))
+    residual_, step_, matrix_ = np.zeros(6), np.zeros(6), np.zeros((6, 6))
+    point_(eps_, old_, new_, sig_, elastic_, True, work_, c_)
+    stiff_ = 0.0
+    for i_ in range(6):
+        stiff_ = max(stiff_, abs(elastic_[i_, i_]))
+    total_ = 0.0
+    highest_ = 0.0
+    for n_ in range(steps_):
+        # the prescribed part of the strain: its increment is put on first, unknown components keep their last value
+        for i_ in range(6):
+            trial_[i_] = base_[n_, i_]
+        for k_ in range(size_):
+            part_ = 0.0
+            for i_ in range(6):
+                part_ += z_[i_, k_]*z_[i_, k_]
+            along_ = 0.0
+            for i_ in range(6):
+                along_ += z_[i_, k_]*(eps_[i_] - base_[n_, i_])
+            step_[k_] = along_/part_
+        for k_ in range(size_):
+            for i_ in range(6):
+                trial_[i_] += z_[i_, k_]*step_[k_]
+        for i_ in range(6):
+            eps_[i_] = trial_[i_]
+        status_, lost_ = point_(eps_, old_, new_, sig_, tangent_, True, work_, c_)
+        done_ = False
+        size_now_, scale_ = 0.0, 0.0
+        for turn_ in range(limit_):
+            size_now_ = 0.0
+            scale_ = 0.0
+            for i_ in range(6):
+                scale_ = max(scale_, abs(sig_[i_]))
+                high_ = 0.0
+                for j_ in range(6):
+                    high_ = max(high_, abs(tangent_[i_, j_])*abs(eps_[j_]))
+                scale_ = max(scale_, high_)
+            for k_ in range(size_):
+                value_ = -goal_[n_, k_]
+                scale_ = max(scale_, abs(goal_[n_, k_]))
+                for i_ in range(6):
+                    value_ += v_[k_, i_]*sig_[i_]
+                residual_[k_] = value_
+                size_now_ = max(size_now_, abs(value_))
+            highest_ = max(highest_, scale_)
+            if status_ != 0:
+                break
+            if size_now_ <= tolerance_*max(scale_, 1e-6*highest_):
+                done_ = True
+                break
+            for k_ in range(size_):
+                for l_ in range(size_):
+                    value_ = 0.0
+                    for i_ in range(6):
+                        if v_[k_, i_] != 0.0:
+                            for j_ in range(6):
+                                value_ += v_[k_, i_]*tangent_[i_, j_]*z_[j_, l_]
+                    matrix_[k_, l_] = value_
+                step_[k_] = -residual_[k_]
+            solve_(matrix_, step_, size_, 1e-13*stiff_)
+            slope_ = 0.0
+            for k_ in range(size_):
+                slope_ += residual_[k_]*step_[k_]
+            # line search: on the slope of the convex incremental energy where the system is its gradient, else on the residual
+            low_, up_, factor_ = 0.0, -1.0, 1.0
+            for cut_ in range(30):
+                for i_ in range(6):
+                    value_ = eps_[i_]
+                    for k_ in range(size_):
+                        value_ += factor_*z_[i_, k_]*step_[k_]
+                    trial_[i_] = value_
+                status_, lost_ = point_(trial_, old_, new_, sig_, tangent_, True, work_, c_)
+                now_, along_ = 0.0, 0.0
+                for k_ in range(size_):
+                    value_ = -goal_[n_, k_]
+                    for i_ in range(6):
+                        value_ += v_[k_, i_]*sig_[i_]
+                    now_ = max(now_, abs(value_))
+                    along_ += value_*step_[k_]
+                if status_ == 0 and now_ < 0.5*size_now_:
+                    break
+                if symmetric_ and slope_ < 0.0:
+                    if status_ == 0 and abs(along_) <= 0.8*abs(slope_):
+                        break
+                    if status_ == 0 and along_ < 0.0:
+                        if up_ < 0.0:
+                            break
+                        low_ = factor_
+                    else:
+                        up_ = factor_
+                    factor_ = 0.5*(low_ + up_)
+                else:
+                    if status_ == 0 and now_ < size_now_:
+                        break
+                    if cut_ > 8:
+                        break
+                    factor_ *= 0.5
+            for i_ in range(6):
+                eps_[i_] = trial_[i_]
+        if not done_:
+            return n_, size_now_, scale_
+        total_ += lost_
+        for i_ in range(6):
+            out_eps_[n_, i_] = eps_[i_]
+            out_sig_[n_, i_] = sig_[i_]
+        for i_ in range(new_.shape[0]):
+            old_[i_] = new_[i_]
+            out_state_[n_, i_] = new_[i_]
+        out_psi_[n_] = energy_(eps_, new_, work_, c_)
+        out_dissipation_[n_] = total_
+    return -1, 0.0, highest_
+'''

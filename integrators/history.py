@@ -1,0 +1,143 @@
+"""Material-point paths under mixed control.
+
+Per component the strain or the stress is prescribed. The unknown strains solve σ_i(ε) = σ̄_i by damped semismooth Newton with the
+consistent tangent; for pure strain and stress control that system is the gradient of the convex incremental energy W_n(ε) − σ̄:ε, and
+the line search uses its slope. A condition on the trace (volume strain, or mean pressure) ties the normal components that have no
+prescription of their own: they share one stress.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError, InputError
+from .update import Array, Update, packed_values
+
+__all__ = ["History", "drive_arrays"]
+
+TOLERANCE = 1e-12
+TURNS = 60
+
+
+@dataclass(frozen=True)
+class History:
+    """Path of one material point, one row per step.
+
+    `eps` [-] and `sig` [Pa] (n, 6), Mandel; `state` by name; `psi` [J/m³] (n,); `dissipation` accumulated [J/m³] (n,); `status` (n,).
+    """
+
+    eps: Array
+    sig: Array
+    state: dict[str, Array]
+    psi: Array
+    dissipation: Array
+    status: NDArray[np.int64]
+
+
+def drive_arrays(
+    update: Update,
+    control: Any,
+    targets: Any,
+    values: Mapping[str, Any],
+    *,
+    trace: str | None = None,
+    trace_targets: Any = None,
+    initial_strain: Any = None,
+    initial_state: Mapping[str, Any] | None = None,
+    tolerance: float = TOLERANCE,
+) -> History:
+    """Follow a path, one step per row of `targets`.
+
+    `control` (6,): True where the stress [Pa] is prescribed, False where the strain [-] is; `targets` (n, 6) the prescribed values,
+    Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
+    condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the stress scale.
+    Raises `InputError`, or `ConvergenceError` with the row.
+    """
+    mask = np.asarray(control, dtype=bool)
+    goals = np.array(targets, dtype=float, ndmin=2)
+    if mask.shape != (6,) or goals.ndim != 2 or goals.shape[1] != 6:
+        raise InputError(f"drive: control has shape {mask.shape} and targets {goals.shape}; they must be (6,) and (n, 6)")
+    free = np.zeros(6, dtype=bool)
+    if trace is not None:
+        if trace not in ("eps_v", "p"):
+            raise InputError(f"drive: trace {trace!r} is not known; it is 'eps_v' or 'p'")
+        free[:3] = np.isnan(goals[:, :3]).all(axis=0)
+        if not free.any():
+            raise InputError(f"drive: '{trace}' replaces a normal component; leave one of xx, yy, zz without prescription (NaN)")
+        condition = np.asarray(trace_targets, dtype=float)
+        if condition.shape != (goals.shape[0],) or not np.isfinite(condition).all():
+            raise InputError("drive: trace_targets must hold one finite value per row")
+        goals[:, free] = 0.0
+    else:
+        condition = np.zeros(goals.shape[0])
+    if not np.isfinite(goals).all():
+        raise InputError(f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})")
+    plan = _plan(mask, free, goals, trace, condition)
+    packed = packed_values(update, values)
+    return _run(update, plan, packed, initial_strain, initial_state, tolerance)
+
+
+@dataclass(frozen=True)
+class _Plan:
+    base: Array
+    goal: Array
+    z: Array
+    v: Array
+    symmetric: bool
+
+
+def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace: str | None, condition: Array) -> _Plan:
+    strain = ~mask & ~free
+    base = np.where(strain, goals, 0.0)
+    stressed = np.flatnonzero(mask & ~free)
+    places = np.flatnonzero(free)
+    unit = np.eye(6)
+    columns, rows = [unit[i] for i in stressed], [unit[i] for i in stressed]
+    goal = [goals[:, i] for i in stressed]
+    symmetric = True
+    if trace is not None:
+        first = places[0]
+        if trace == "eps_v":
+            base[:, first] = condition - base[:, :3].sum(axis=1)
+            for k, i in enumerate(stressed):
+                if i < 3:
+                    columns[k] = unit[i] - unit[first]
+                    symmetric = False
+            columns += [unit[i] - unit[first] for i in places[1:]]
+        else:
+            columns += [unit[i] for i in places]
+            rows.append(-np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0]) / 3.0)
+            goal.append(condition)
+            symmetric = False
+        rows += [unit[i] - unit[first] for i in places[1:]]
+        goal += [np.zeros(len(goals)) for _ in places[1:]]
+    count = len(columns)
+    z = np.array(columns).T.reshape(6, count)
+    v = np.array(rows).reshape(count, 6)
+    goal_rows = np.array(goal).T.reshape(len(goals), count)
+    return _Plan(*(np.ascontiguousarray(a) for a in (base, goal_rows, z, v)), symmetric)
+
+
+def _run(
+    update: Update, plan: _Plan, values: Array, initial_strain: Any, initial_state: Mapping[str, Any] | None, tolerance: float
+) -> History:
+    n = len(plan.base)
+    eps, sig = np.zeros((n, 6)), np.zeros((n, 6))
+    state = np.zeros((n, update.state_size))
+    psi, dissipation = np.zeros(n), np.zeros(n)
+    start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
+    old = update.pack(initial_state, 1)[0]
+    failed, residual, scale = update.module.drive_(
+        plan.base, plan.goal, plan.z, plan.v, plan.symmetric, start, old, eps, sig, state, psi, dissipation, values, tolerance, TURNS
+    )
+    if failed >= 0:
+        raise ConvergenceError(
+            f"law '{update.law.name}': the path fails at row {failed}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
+            "take smaller steps, or the prescribed stress cannot be carried"
+        )
+    return History(eps, sig, update.unpack(state), psi, dissipation, np.zeros(n, dtype=np.int64))

@@ -1,0 +1,27 @@
+"""The key of generated code: a hash of the two rooms that write it, and of the versions that compile it."""
+
+from __future__ import annotations
+
+import functools
+import platform
+import sys
+from importlib.metadata import version
+from pathlib import Path
+
+from ..cache import content_hash
+
+__all__ = ["rooms_hash"]
+
+
+@functools.cache
+def rooms_hash() -> str:
+    """Hash of the sources of `potentials` and `integrators`, of Python, sympy, numba and the processor."""
+    root = Path(__file__).parent.parent
+    parts: list[str | bytes] = [sys.version, platform.machine(), version("sympy"), version("numba"), version("llvmlite")]
+    for room in ("potentials", "integrators"):
+        for file in sorted((root / room).rglob("*.py")):
+            if "library" not in file.parts:
+                parts += [file.name, file.read_bytes()]
+    for file in ("cache.py",):
+        parts.append((root / file).read_bytes())
+    return content_hash(*parts)

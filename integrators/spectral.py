@@ -1,0 +1,167 @@
+"""Numerical operators on symmetric 3×3 tensors in Mandel components, called by generated modules.
+
+Eigenvalues and vectors by deflation: the best separated root of the characteristic polynomial in closed form, its vector as the
+largest cross product, a plane rotation for the other two, Rayleigh quotients for all three. Exactly repeated eigenvalues are no
+special case: the rotation of a multiple of the identity is the identity.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..cache import njit
+from .key import rooms_hash
+
+__all__ = ["add_positive_derivative", "norm6", "positive_part"]
+
+_FOLDER = rooms_hash()
+
+
+@njit(folder=_FOLDER, inline="never")
+def norm6(a):
+    """Euclidean norm of six components; the plain sum of squares unless it would leave the range of the exponent."""
+    total = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3] + a[4] * a[4] + a[5] * a[5]
+    if 1e-280 < total < 1e280:
+        return math.sqrt(total)
+    largest = 0.0
+    for i in range(6):
+        size = abs(a[i])
+        if not size <= largest:
+            largest = size
+    if largest == 0.0 or not largest < math.inf:
+        return largest
+    total = 0.0
+    for i in range(6):
+        part = a[i] / largest
+        total += part * part
+    return largest * math.sqrt(total)
+
+
+@njit(folder=_FOLDER)
+def eigen(t, out):
+    """Eigenvalues in `out[0:3]`, orthonormal eigenvectors as columns of `out[3:12]` (row-major 3×3), of the Mandel tensor `t`."""
+    half = 0.7071067811865476
+    scale = 0.0
+    for i in range(6):
+        scale = max(scale, abs(t[i]))
+    for i in range(12):
+        out[i] = 0.0
+    if scale == 0.0 or not scale < math.inf:
+        out[3] = out[7] = out[11] = 1.0
+        return
+    a, b, c = t[0] / scale, t[1] / scale, t[2] / scale
+    f, e, d = half * t[3] / scale, half * t[4] / scale, half * t[5] / scale
+    mean = (a + b + c) / 3.0
+    x, y, z = a - mean, b - mean, c - mean
+    j2 = 0.5 * (x * x + y * y + z * z) + f * f + e * e + d * d
+    if j2 < 1e-30:
+        out[0], out[1], out[2] = t[0], t[1], t[2]
+        out[3] = out[7] = out[11] = 1.0
+        return
+    j3 = x * (y * z - f * f) - d * (d * z - f * e) + e * (d * f - y * e)
+    radius = math.sqrt(j2 / 3.0)
+    cosine = min(1.0, abs(j3) / (2.0 * radius * radius * radius))
+    root = 2.0 * radius * math.cos(math.acos(cosine) / 3.0)
+    if j3 < 0.0:
+        root = -root
+    # rows of dev T − root I; their largest cross product spans the kernel
+    p0, p1, p2 = x - root, y - root, z - root
+    u0, u1, u2 = d * f - e * p1, e * d - p0 * f, p0 * p1 - d * d
+    v0, v1, v2 = d * p2 - e * f, e * e - p0 * p2, p0 * f - d * e
+    w0, w1, w2 = p1 * p2 - f * f, f * e - d * p2, d * f - p1 * e
+    nu, nv, nw = u0 * u0 + u1 * u1 + u2 * u2, v0 * v0 + v1 * v1 + v2 * v2, w0 * w0 + w1 * w1 + w2 * w2
+    if nv > nu and nv >= nw:
+        u0, u1, u2, nu = v0, v1, v2, nv
+    elif nw > nu:
+        u0, u1, u2, nu = w0, w1, w2, nw
+    size = 1.0 / math.sqrt(nu)
+    u0, u1, u2 = u0 * size, u1 * size, u2 * size
+    # an orthonormal basis (v, w) of the complement of u
+    if abs(u0) > abs(u2):
+        size = 1.0 / math.sqrt(u0 * u0 + u1 * u1)
+        v0, v1, v2 = -u1 * size, u0 * size, 0.0
+    else:
+        size = 1.0 / math.sqrt(u1 * u1 + u2 * u2)
+        v0, v1, v2 = 0.0, -u2 * size, u1 * size
+    w0, w1, w2 = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+    s0, s1, s2 = a * v0 + d * v1 + e * v2, d * v0 + b * v1 + f * v2, e * v0 + f * v1 + c * v2
+    r0, r1, r2 = a * w0 + d * w1 + e * w2, d * w0 + b * w1 + f * w2, e * w0 + f * w1 + c * w2
+    vv, vw, ww = v0 * s0 + v1 * s1 + v2 * s2, v0 * r0 + v1 * r1 + v2 * r2, w0 * r0 + w1 * r1 + w2 * r2
+    if vw != 0.0:
+        ratio = (ww - vv) / (2.0 * vw)
+        tangent = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + math.hypot(1.0, ratio))
+        cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
+        sine = tangent * cosine
+        v0, w0 = cosine * v0 - sine * w0, sine * v0 + cosine * w0
+        v1, w1 = cosine * v1 - sine * w1, sine * v1 + cosine * w1
+        v2, w2 = cosine * v2 - sine * w2, sine * v2 + cosine * w2
+        vv, ww = vv - tangent * vw, ww + tangent * vw
+    uu = u0 * (a * u0 + d * u1 + e * u2) + u1 * (d * u0 + b * u1 + f * u2) + u2 * (e * u0 + f * u1 + c * u2)
+    out[0], out[1], out[2] = uu * scale, vv * scale, ww * scale
+    out[3], out[4], out[5] = u0, v0, w0
+    out[6], out[7], out[8] = u1, v1, w1
+    out[9], out[10], out[11] = u2, v2, w2
+
+
+@njit(folder=_FOLDER)
+def positive_part(t, eigen_, out):
+    """Spectral positive part of `t` into `out`; the decomposition is left in `eigen_`. Returns Σ ⟨t_i⟩²."""
+    root = 1.4142135623730951
+    eigen(t, eigen_)
+    for i in range(6):
+        out[i] = 0.0
+    total = 0.0
+    if eigen_[0] >= 0.0 and eigen_[1] >= 0.0 and eigen_[2] >= 0.0:
+        for i in range(6):
+            out[i] = t[i]
+            total += t[i] * t[i]
+        return total
+    for k in range(3):
+        value = eigen_[k]
+        if value > 0.0:
+            x, y, z = eigen_[3 + k], eigen_[6 + k], eigen_[9 + k]
+            out[0] += value * x * x
+            out[1] += value * y * y
+            out[2] += value * z * z
+            out[3] += root * value * y * z
+            out[4] += root * value * x * z
+            out[5] += root * value * x * y
+            total += value * value
+    return total
+
+
+@njit(folder=_FOLDER)
+def add_positive_derivative(weight, eigen_, dyads, tangent):
+    """Add weight · D[·]^≥ to `tangent` (6×6): Θ_ij = (⟨e_i⟩−⟨e_j⟩)/(e_i−e_j), and H(e_i) for equal values; `dyads` is work space."""
+    count = 0
+    for k in range(3):
+        if eigen_[k] > 0.0:
+            count += 1
+    if count == 0:
+        return
+    if count == 3:
+        for i in range(6):
+            tangent[i, i] += weight
+        return
+    root = 1.4142135623730951
+    for k in range(6):
+        if k < 3:
+            l = m = k
+            theta = 1.0 if eigen_[k] > 0.0 else 0.0
+            factor = 1.0
+        else:
+            l, m = (k - 2) % 3, (k - 1) % 3
+            high, low = max(eigen_[l], eigen_[m]), min(eigen_[l], eigen_[m])
+            theta = 0.0 if high <= 0.0 else (1.0 if low > 0.0 else high / (high - low))
+            factor = root
+        if theta == 0.0:
+            continue
+        x, y, z = eigen_[3 + l], eigen_[6 + l], eigen_[9 + l]
+        p, q, r = eigen_[3 + m], eigen_[6 + m], eigen_[9 + m]
+        dyads[0], dyads[1], dyads[2] = factor * x * p, factor * y * q, factor * z * r
+        half = factor / root
+        dyads[3], dyads[4], dyads[5] = half * (y * r + z * q), half * (x * r + z * p), half * (x * q + y * p)
+        for i in range(6):
+            part = weight * theta * dyads[i]
+            for j in range(6):
+                tangent[i, j] += part * dyads[j]

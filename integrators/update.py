@@ -1,0 +1,205 @@
+"""The implicit step of a law as a callable on arrays of points.
+
+    (ε_{n+1}, X_n) ↦ (σ, X_{n+1}):   X_{n+1} = argmin ψ(ε_{n+1}, X) + φ(X − X_n),   σ = ∂ψ/∂ε,
+
+φ the support function of the elastic domain: implicit Euler, and exactly a convex projection of the trial forces.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import ConvergenceError, DeclarationError, InputError, Status
+from ..potentials import Law
+from .closed import state_layout
+from .module_store import load_module
+from .structure import NoConeStructure
+
+__all__ = ["StepResult", "Update", "build_update", "packed_values"]
+
+Array = NDArray[np.float64]
+_EMPTY: Array = np.zeros((0, 6, 6))
+
+
+@dataclass(frozen=True)
+class StepResult:
+    """Result of one step at n points.
+
+    `stress` [Pa] (n, 6) and `tangent` [Pa] (n, 6, 6) in Mandel components; `state` by name, tensors (n, 6), scalars (n,);
+    `dissipation` of the step [J/m³] (n,); `status` (n,) of `Status` codes; `gap` [J/m³] (n,), primal minus dual, if certified.
+    """
+
+    stress: Array
+    tangent: Array | None
+    state: dict[str, Array]
+    dissipation: Array
+    status: NDArray[np.int64]
+    gap: Array | None = None
+
+
+@dataclass(frozen=True)
+class Update:
+    """Compiled implicit step of `law`; `layout` gives the place of each internal variable in a packed state row."""
+
+    law: Law
+    module: ModuleType
+    tangent: bool = True
+    solver: str = "closed"
+    layout: Mapping[str, tuple[int, int]] = field(default_factory=dict)
+    state_size: int = 0
+
+    def initial_state(self, point_count: int = 1) -> dict[str, Array]:
+        """Virgin state: all internal variables zero."""
+        if point_count < 0:
+            raise InputError(f"initial_state: the number of points is {point_count}; it must not be negative")
+        return self.unpack(np.zeros((point_count, self.state_size)))
+
+    def unpack(self, packed: Array) -> dict[str, Array]:
+        """Views of a packed state (n, state_size) by name."""
+        return {n: packed[:, s] if length == 1 else packed[:, s : s + 6] for n, (s, length) in self.layout.items()}
+
+    def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
+        """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""
+        packed = np.zeros((point_count, self.state_size))
+        if state is None:
+            return packed
+        for name in state:
+            if name not in self.layout:
+                raise InputError(f"law '{self.law.name}' has no internal variable '{name}'; it has: {', '.join(self.layout) or 'none'}")
+        for name, (start, length) in self.layout.items():
+            if name not in state:
+                raise InputError(f"law '{self.law.name}': the state lacks the internal variable '{name}'")
+            value = np.asarray(state[name], dtype=float)
+            shape = (point_count,) if length == 1 else (point_count, 6)
+            if value.shape != shape:
+                try:
+                    value = np.broadcast_to(value, shape)
+                except ValueError:
+                    raise InputError(f"state '{name}' has shape {value.shape}; for {point_count} points it must be {shape}") from None
+            if not np.isfinite(value).all():
+                raise InputError(f"state '{name}' holds a value that is not finite")
+            packed[:, start : start + length] = value.reshape(point_count, length)
+        return packed
+
+    def __call__(
+        self, eps_new: Any, state: Mapping[str, Any] | None = None, dt: float = 1.0, *, certify: bool = False, **values: Any
+    ) -> StepResult:
+        """Step to the strains `eps_new` [-], Mandel components, shape (n, 6) or (6,).
+
+        `state` is an earlier `.state` or None; `dt` [s] has no effect on rate-independent laws; `values` are the parameters by name.
+        Raises `InputError` for bad input and `ConvergenceError`, naming the first points, where the step fails.
+        """
+        eps = strain_array(eps_new)
+        if not (np.isfinite(dt) and dt > 0):
+            raise InputError(f"dt = {dt}: the time step must be positive and finite")
+        packed_parameters = packed_values(self, values)
+        n = eps.shape[0]
+        old = self.pack(state, n)
+        new, stress = np.empty_like(old), np.empty((n, 6))
+        tangent = np.empty((n, 6, 6)) if self.tangent else np.empty((1, 6, 6))
+        dissipation, status = np.empty(n), np.empty(n, dtype=np.int64)
+        self.module.batch_(eps, old, new, stress, tangent, self.tangent, dissipation, status, packed_parameters)
+        raise_failures(status, eps)
+        gap = None
+        if certify:
+            from .certificate import duality_gap
+
+            gap = duality_gap(self, eps, old, new, packed_parameters)
+        return StepResult(stress, tangent if self.tangent else None, self.unpack(new), dissipation, status, gap)
+
+    def energy(self, eps: Any, state: Mapping[str, Any] | None = None, **values: Any) -> Array:
+        """Free energy ψ [J/m³] at the given strains and internal variables, shape (n,)."""
+        strain = strain_array(eps)
+        psi = np.empty(strain.shape[0])
+        self.module.energies_(strain, self.pack(state, strain.shape[0]), psi, packed_values(self, values))
+        return psi
+
+
+def strain_array(eps: Any) -> Array:
+    """Strains as a contiguous (n, 6) array; refuses other shapes and values that are not finite."""
+    try:
+        found = np.atleast_2d(np.asarray(eps, dtype=float))
+    except (TypeError, ValueError):
+        raise InputError("eps_new must be an array of numbers") from None
+    if found.ndim != 2 or found.shape[1] != 6:
+        raise InputError(f"eps_new has shape {np.shape(eps)}; it must be (n, 6) or (6,), Mandel components")
+    if not np.isfinite(found).all():
+        row = int(np.argmax(~np.isfinite(found).all(axis=1)))
+        raise InputError(f"eps_new holds a value that is not finite (point {row})")
+    return np.ascontiguousarray(found)
+
+
+def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
+    """Parameter values as an array in the order of `law.parameters`, checked against bounds and against softening."""
+    values = np.array(list(update.law.values(given).values()), dtype=float)
+    check_moduli(update.law, update.module.moduli_, values)
+    return values
+
+
+def check_moduli(law: Law, moduli: Any, values: Array) -> None:
+    """Refuse values that make ψ non-convex or infinite, by the moduli that the law's derivation lists."""
+    try:
+        entries = moduli(values)
+    except (ZeroDivisionError, OverflowError, ValueError):
+        entries = ((law.name, " ".join(p.name for p in law.parameters), np.nan),)
+    table = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
+    for variable, names, value in entries:
+        if np.isfinite(value) and value >= 0.0:
+            continue
+        involved = names.split()
+        shown = ", ".join(f"{n} = {table[n]:g}" for n in involved)
+        if not np.isfinite(value):
+            raise InputError(f"law '{law.name}': {shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2")
+        negative = [n for n in involved if table[n] < 0] or involved
+        if variable != law.observable.name:
+            raise InputError(
+                f"law '{law.name}': {', '.join(f'{n} = {table[n]:g}' for n in negative)} gives '{variable}' a negative modulus; "
+                "psi would not be convex: softening is not modelled"
+            )
+        raise InputError(f"law '{law.name}': {shown} give a negative stiffness; psi would not be convex")
+
+
+def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
+    """`ConvergenceError` that names the first failing points."""
+    failed = np.flatnonzero(status)
+    if failed.size == 0:
+        return
+    first = ", ".join(str(int(i)) for i in failed[:5])
+    reason = {Status.NOT_FINITE: "overflow", Status.INFEASIBLE: "no plastically admissible stress", Status.ITERATION_LIMIT: "iteration limit"}
+    word = reason.get(Status(int(status[failed[0]])), "failure")
+    strain = np.array2string(eps[failed[0]], precision=6, max_line_width=1000)
+    raise ConvergenceError(f"the step fails at {failed.size} of {status.size} points ({word}), first {first}; strain of the first: {strain}")
+
+
+def build_update(
+    law: Law, dimension: str = "3d", *, formulation: str = "strain", solver: str = "auto", tangent: bool = True
+) -> Any:
+    """Choose the cheapest exact method for the law: `closed` where the structure is found, else `conic` (slow, any conic law)."""
+    if dimension != "3d":
+        raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
+    if formulation != "strain":
+        raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
+    if solver not in ("auto", "closed", "conic"):
+        raise InputError(f"solver {solver!r} is not known; it is one of auto, closed, conic")
+    if not isinstance(law, Law):
+        raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
+    law.check_evolution()
+    if solver != "conic":
+        try:
+            module = load_module(law)
+            layout, size = state_layout(law)
+            return Update(law, module, tangent, "closed", layout, size)
+        except NoConeStructure as reason:
+            if solver == "closed":
+                raise
+            why = reason
+            del why
+    from .conic_update import ConicUpdate
+
+    return ConicUpdate.of(law, tangent)

@@ -1,0 +1,172 @@
+"""Scalar symbols: parameters with unit and bounds, scalar variables and their forces, the positive part and its step.
+
+sympy's `Max` differentiates to `Heaviside` and `DiracDelta`, which take values at the kink that are neither one-sided limit;
+`PositivePart` and `Step` are used instead: d⟨x⟩/dx = H(x), dH/dx = 0, H(0) = 0, an element of the generalised derivative.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+from sympy import Expr, Function, S, Symbol
+
+from ..errors import DeclarationError
+from .names import checked_name, latex_name
+
+__all__ = ["ForceScalar", "Parameter", "PositivePart", "ScalarVariable", "Step", "parameter", "parameters", "scalar", "tidy"]
+
+
+class Parameter(Symbol):
+    """Real parameter of a law, with unit, closed bounds, an optional default value and one line of description."""
+
+    __slots__ = ("default", "lower", "note", "unit", "upper")
+    lower: float
+    upper: float
+    unit: str
+    default: float | None
+    note: str
+
+    def __new__(
+        cls, name: str, lower: float = -math.inf, upper: float = math.inf, unit: str = "", default: float | None = None, note: str = ""
+    ) -> Parameter:
+        obj = Symbol.__xnew__(cls, name, real=True)
+        obj.lower, obj.upper, obj.unit, obj.default, obj.note = lower, upper, unit, default, note
+        return obj
+
+    def __getnewargs_ex__(self) -> Any:
+        return ((self.name, self.lower, self.upper, self.unit, self.default, self.note), {})
+
+    def _hashable_content(self) -> Any:
+        return (*super()._hashable_content(), self.lower, self.upper, self.unit, str(self.default), self.note)
+
+    def _latex(self, printer: Any, exp: str | None = None) -> str:
+        return latex_name(self.name) + ("" if exp is None else f"^{{{exp}}}")
+
+
+class ScalarVariable(Symbol):
+    """Scalar state variable."""
+
+    __slots__ = ()
+
+    def __new__(cls, name: str) -> ScalarVariable:
+        return Symbol.__xnew__(cls, name, real=True)
+
+    def __getnewargs_ex__(self) -> Any:
+        return ((self.name,), {})
+
+    def _latex(self, printer: Any, exp: str | None = None) -> str:
+        return latex_name(self.name) + ("" if exp is None else f"^{{{exp}}}")
+
+
+class ForceScalar(ScalarVariable):
+    """Thermodynamic force R = −∂ψ/∂p of a scalar variable."""
+
+    __slots__ = ("variable",)
+    variable: ScalarVariable
+
+    def __new__(cls, name: str, variable: ScalarVariable) -> ForceScalar:
+        obj = Symbol.__xnew__(cls, name, real=True)
+        obj.variable = variable
+        return obj
+
+    def __getnewargs_ex__(self) -> Any:
+        return ((self.name, self.variable), {})
+
+    def _hashable_content(self) -> Any:
+        return (*super()._hashable_content(), self.variable.name)
+
+
+class PositivePart(Function):
+    """⟨x⟩ = max(x, 0): convex, non-decreasing, positively homogeneous of degree 1."""
+
+    is_real = True
+    is_nonnegative = True
+
+    @classmethod
+    def eval(cls, x: Expr) -> Expr | None:
+        if x.is_nonnegative:
+            return x
+        return S.Zero if x.is_nonpositive else None
+
+    def fdiff(self, argindex: int = 1) -> Expr:
+        return Step(self.args[0])
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"pos({printer._print(self.args[0])})"
+
+    def _latex(self, printer: Any, exp: str | None = None) -> str:
+        body = rf"\left\langle {printer._print(self.args[0])}\right\rangle"
+        return body if exp is None else rf"{body}^{{{exp}}}"
+
+
+class Step(Function):
+    """H(x) = 1 for x > 0, else 0; its derivative is taken as 0 (the kink has measure zero)."""
+
+    is_real = True
+    is_nonnegative = True
+
+    @classmethod
+    def eval(cls, x: Expr) -> Expr | None:
+        if x.is_positive:
+            return S.One
+        return S.Zero if x.is_nonpositive else None
+
+    def fdiff(self, argindex: int = 1) -> Expr:
+        return S.Zero
+
+    def _eval_power(self, exponent: Expr) -> Expr | None:
+        return self if exponent.is_positive else None
+
+    def _sympystr(self, printer: Any) -> str:
+        return f"step({printer._print(self.args[0])})"
+
+    def _latex(self, printer: Any, exp: str | None = None) -> str:
+        body = rf"H\left({printer._print(self.args[0])}\right)"
+        return body if exp is None else rf"{body}^{{{exp}}}"
+
+
+def tidy(expression: Expr) -> Expr:
+    """Write ⟨x⟩ H(x) as ⟨x⟩."""
+    if not expression.has(Step):
+        return expression
+    if expression.is_Add:
+        return expression.func(*(tidy(a) for a in expression.args))
+    if expression.is_Mul:
+        parts = [tidy(a) for a in expression.args]
+        positive = {base.args[0] for part in parts for base in (part, part.as_base_exp()[0]) if isinstance(base, PositivePart)}
+        return expression.func(*(a for a in parts if not (isinstance(a, Step) and a.args[0] in positive)))
+    return expression
+
+
+def parameter(
+    name: str,
+    *,
+    lower: float | None = None,
+    upper: float | None = None,
+    unit: str = "",
+    default: float | None = None,
+    note: str = "",
+) -> Parameter:
+    """Declare one parameter. `lower`, `upper` are closed bounds on its value, `default` is used where no value is given."""
+    checked_name(name, "parameter")
+    low = -math.inf if lower is None else float(lower)
+    high = math.inf if upper is None else float(upper)
+    if not low <= high:
+        raise DeclarationError(f"parameter '{name}': the lower bound {low:g} must not exceed the upper bound {high:g}")
+    if default is not None and not low <= float(default) <= high:
+        raise DeclarationError(f"parameter '{name}': the default {default:g} lies outside [{low:g}, {high:g}]")
+    return Parameter(name, low, high, str(unit), None if default is None else float(default), str(note))
+
+
+def parameters(names: str) -> Any:
+    """Declare several parameters without bounds, names apart by spaces or commas; one name gives the symbol, several a tuple."""
+    if not isinstance(names, str) or not names.strip() or len(names) > 4000:
+        raise DeclarationError("parameters takes one string of names apart by spaces, for example 'E_s nu_s'")
+    found = tuple(parameter(name) for name in names.replace(",", " ").split(" ") if name)
+    return found[0] if len(found) == 1 else found
+
+
+def scalar(name: str) -> ScalarVariable:
+    """Declare a scalar state variable."""
+    return ScalarVariable(checked_name(name, "scalar"))
