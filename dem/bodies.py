@@ -42,6 +42,7 @@ class Assembly:
     wall_impulse: Array  # (w,) [N s]
     listed_x: Array  # (n, 3) positions when the candidates were listed
     listed_half: Array  # (3,)
+    apart: int = 1  # least difference of ranks at which beads of one wire may touch
     step: float = 0.0  # the step that the impulses belong to [s]; 0: none yet
     elastic_energy: float = 0.0  # stored in contacts and links [J]
     time: float = 0.0  # [s]
@@ -67,6 +68,9 @@ class Assembly:
         same = wire[order[1:]] == wire[order[:-1]]
         links = np.stack([order[:-1][same], order[1:][same]], axis=1).astype(np.int32)
         x = np.array(x, dtype=float)
+        lengths = np.linalg.norm(x[links[:, 0]] - x[links[:, 1]], axis=1)
+        # beads that overlap on a straight wire are bonded, not in contact
+        apart = 1 + int(2.0 * radius[links[:, 0]].max() / lengths.mean() * (1.0 + 1e-9)) if len(links) else 1
         return cls(
             x=x,
             radius=np.array(radius, dtype=float),
@@ -79,7 +83,7 @@ class Assembly:
             box_velocity=np.zeros(3),
             box_mass=np.full(3, 0.4 * mass.sum()) if box_mass is None else np.array(box_mass, dtype=float),
             links=links,
-            link_length=np.linalg.norm(x[links[:, 0]] - x[links[:, 1]], axis=1),
+            link_length=lengths,
             link_impulse=np.zeros(len(links)),
             pairs=np.empty((0, 2), dtype=np.int32),
             pair_impulse=np.zeros((0, 3)),
@@ -87,6 +91,7 @@ class Assembly:
             wall_impulse=np.zeros(0),
             listed_x=np.full((n, 3), np.inf),
             listed_half=np.full(3, np.inf),
+            apart=apart,
         )
 
     @property
@@ -128,7 +133,13 @@ class Assembly:
     @classmethod
     def from_arrays(cls, data: dict[str, Any]) -> Assembly:
         """Inverse of `arrays`."""
-        return cls(**{f.name: float(data[f.name]) if f.name in _SCALARS else data[f.name] for f in fields(cls)})
+        return cls(**{f.name: _SCALARS[f.name](data[f.name]) if f.name in _SCALARS else data[f.name] for f in fields(cls)})
+
+    def release_links(self) -> None:
+        """Make the present link lengths the reference lengths: wires without force."""
+        if len(self.links):
+            self.link_length = np.linalg.norm(self.x[self.links[:, 0]] - self.x[self.links[:, 1]], axis=1)
+            self.link_impulse = np.zeros(len(self.links))
 
 
-_SCALARS = ("step", "elastic_energy", "time")
+_SCALARS = {"apart": int, "step": float, "elastic_energy": float, "time": float}

@@ -140,7 +140,7 @@ def _relax(assembly: Assembly, radius: Array, spacing: float, passes: int, goal:
     worst = 0.0
     for _ in range(passes):
         if not np.max(np.sum((x - listed) ** 2, axis=1)) < (0.5 * skin) ** 2:
-            pairs = find_pairs(x, radius, assembly.wire, assembly.rank, skin)
+            pairs = find_pairs(x, radius, assembly.wire, assembly.rank, assembly.apart, skin)
             listed = x.copy()
         worst = float(_spread(x, radius, pairs, assembly.links, spacing, assembly.half))
         if worst < goal:

@@ -68,12 +68,14 @@ class TriaxialRecord:
     axial_strain: Array
     wall_strain: Array
     wall_stress: Array
+    box_stress: Array  # homogenised over the whole box, all phases
     octant_volume: Array  # (8,) of the measuring sphere [m3]
     grain_moment: Array  # (frame_count, 8, 3, 3) sum of f ⊗ l inside the sphere, grains [J]
     bead_moment: Array  # the same, grain contacts of the beads
     link_moment: Array  # the same, links
     grain_fit: Array  # (frame_count, 8, 1+3+3+9+9): count, Σx, Σu, Σx⊗x, Σu⊗x over the grains of the reference set
     bead_fit: Array
+    series: dict[str, Array] = field(default_factory=dict)  # (frame_count,) measures of `dem.residual`, energies summed
     quality: dict[str, float] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
 

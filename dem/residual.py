@@ -151,6 +151,8 @@ def assess(
         out[10] -= t0 * l0 + t1 * l1 + t2 * l2
         x0, x1, x2 = t0 - contact[k, 6], t1 - contact[k, 7], t2 - contact[k, 8]
         out[11] += 0.5 * (cn * (pn - contact[k, 14]) ** 2 + ct * (x0 * x0 + x1 * x1 + x2 * x2))
+        if contact[k, 9] > 0.0:
+            out[11] += pn * contact[k, 9]  # the force acts during the whole step in which the gap closes
         out[12] += 0.5 * (p[0] * (u[0] - w[0]) + p[1] * (u[1] - w[1]) + p[2] * (u[2] - w[2]))
         if pn > 0.0:
             closed += 1
@@ -174,6 +176,8 @@ def assess(
         work += p * (un + wn)
         out[9] += 0.5 * cn * p * p
         out[11] += 0.5 * cn * (p - wall_row[k, 4]) ** 2
+        if wall_row[k, 1] > 0.0:
+            out[11] += p * wall_row[k, 1]
         out[12] += 0.5 * p * (un - wn)
         if driven[axis]:
             out[13] -= p * 0.5 * (box[axis, 0] + box_before[axis, 0])
@@ -200,6 +204,8 @@ def assess(
         work -= r * (un + wn)
         out[9] += 0.5 * link_row[k, 6] * r * r
         out[11] += 0.5 * link_row[k, 6] * (r - link_row[k, 7]) ** 2
+        if unilateral and link_row[k, 4] < 0.0:
+            out[11] -= r * link_row[k, 4]  # the slack taken up in this step
         out[12] -= 0.5 * r * (un - wn)
     for i in range(bodies):
         change = 0.0

@@ -60,7 +60,7 @@ class Drive:
 
 @dataclass
 class Contacts:
-    """The solved one-step problem: index and row arrays of `dem.contacts`, step and compliances."""
+    """The one-step problem: index and row arrays of `dem.contacts`, step, compliances, and the configuration of detection."""
 
     pair: NDArray[np.int32]
     contact: Array
@@ -71,6 +71,8 @@ class Contacts:
     step: float
     cn: float
     ct: float
+    x: Array
+    half: Array
 
 
 class Simulation:
@@ -94,7 +96,7 @@ class Simulation:
             moved = max(moved, np.sqrt(np.max(np.sum((a.x - a.listed_x) ** 2, axis=1))))
         if moved < 0.45 * self.skin:
             return
-        pairs = find_pairs(a.x, a.radius, a.wire, a.rank, self.skin)
+        pairs = find_pairs(a.x, a.radius, a.wire, a.rank, a.apart, self.skin)
         impulse = np.zeros((len(pairs), 3))
         if len(a.pairs) and len(pairs):
             n = np.int64(len(a.x))
@@ -158,7 +160,9 @@ class Simulation:
             law.prestrain,
             law.length_correction,
         )
-        return before, free, box_before, box_free, driven, Contacts(pair, contact, wall, wall_row, link, link_row, step, cn, ct)
+        return before, free, box_before, box_free, driven, Contacts(
+            pair, contact, wall, wall_row, link, link_row, step, cn, ct, a.x.copy(), a.half.copy()
+        )  # fmt: skip
 
     def advance(self, step: float, drive: Drive) -> dict[str, float]:
         """One step of length `step` [s]; returns the measures of `dem.residual` by name.

@@ -43,14 +43,28 @@ def cache_folder() -> Path:
 
 
 @functools.cache
-def source_hash() -> str:
-    """Hash of every source file of the installed package, of the Python version and of the processor."""
+def source_hash(room: str) -> str:
+    """Hash of every source that code of a room can call, of the Python version and of the processor.
+
+    A room calls itself, the rooms below it and the ground floor (the import contract), so an edit elsewhere keeps its code warm.
+    """
     root = Path(__file__).parent
-    files = sorted(root.rglob("*.py"))
+    folders = [root / room] if room else [root]
+    folders += [root / below for below in _BELOW.get(room, ())]
+    files = sorted({file for folder in folders for file in folder.rglob("*.py")} | {Path(__file__)})
     parts: list[str | bytes] = [sys.version, platform.machine(), platform.processor()]
     for file in files:
         parts += [str(file.relative_to(root)), file.read_bytes()]
     return content_hash(*parts)
+
+
+_BELOW = {"integrators": ("potentials",), "identify": ("potentials", "integrators", "dem")}
+
+
+def _room(function: Callable[..., Any]) -> str:
+    """The room of a function by its module name; "" (everything) outside the rooms."""
+    parts = function.__module__.split(".")
+    return parts[1] if len(parts) > 2 and parts[0] == "fenchel" else ""
 
 
 def njit(function: Callable[..., Any] | None = None, /, *, folder: str = "", **options: Any) -> Any:
@@ -58,10 +72,12 @@ def njit(function: Callable[..., Any] | None = None, /, *, folder: str = "", **o
     if function is None:
         return functools.partial(njit, folder=folder, **options)
     import numba
-    from numba.core import config
+    from numba.core import config as settings
+
+    config: Any = settings  # its attributes are made at run time
 
     options = {"cache": True, "error_model": "numpy", **options}
-    place = cache_folder() / "numba" / (folder or source_hash())
+    place = cache_folder() / "numba" / (folder or source_hash(_room(function)))
     with _decorating:
         before = config.CACHE_DIR
         config.CACHE_DIR = str(place)

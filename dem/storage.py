@@ -1,0 +1,115 @@
+"""Run files: one HDF5 file per run, replaced atomically, so that a kill or a full disk leaves the last complete one.
+
+The image is built in memory, written beside the target, flushed to the disk and moved over it. Units and provenance are attributes.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import platform
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__
+from ..errors import InputError, StorageError
+
+__all__ = ["UNITS", "load_run", "replace_file", "save_run"]
+
+FORMAT = 1
+
+UNITS = {
+    "pressure": "Pa", "axial_strain": "1", "wall_strain": "1", "wall_stress": "Pa", "box_stress": "Pa", "octant_volume": "m3",
+    "grain_moment": "J", "bead_moment": "J", "link_moment": "J", "x": "m", "radius": "m", "mass": "kg", "velocity": "m/s",
+    "spin": "m/s", "half": "m", "box_velocity": "m/s", "box_mass": "kg", "link_length": "m", "link_impulse": "N s",
+    "pair_impulse": "N s", "wall_impulse": "N s", "listed_x": "m", "listed_half": "m", "step": "s", "elastic_energy": "J",
+    "time": "s", "elastic": "J", "friction": "J", "algorithmic": "J", "shock": "J", "external": "J", "kinetic": "J", "balance": "J",
+    "force_mean": "N", "overlap_mean": "m", "overlap_max": "m", "violation_max": "m",
+}  # fmt: skip
+
+
+def replace_file(path: Path | str, data: bytes) -> None:
+    """Write `data` so that `path` holds either its old or its new content, never a part; `StorageError` if it cannot."""
+    path = Path(path)
+    temporary = None
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise StorageError(
+            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: free some space or choose another place"
+        ) from None
+
+
+def _put(group: Any, name: str, value: Any) -> None:
+    if isinstance(value, dict):
+        inner = group.create_group(name)
+        for key, item in value.items():
+            _put(inner, key, item)
+    elif isinstance(value, np.ndarray):
+        data = group.create_dataset(name, data=value, compression="gzip" if value.size > 4096 else None)
+        if name in UNITS:
+            data.attrs["unit"] = UNITS[name]
+    else:
+        group.attrs[name] = value
+
+
+def _take(group: Any) -> dict[str, Any]:
+    out: dict[str, Any] = {}
+    for key, value in group.attrs.items():
+        if not isinstance(value, np.ndarray) and hasattr(value, "item"):
+            value = value.item()
+        out[key] = value
+    for key, item in group.items():
+        out[key] = _take(item) if hasattr(item, "items") else item[()]
+    return out
+
+
+def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]) -> None:
+    """Write a nested dictionary of arrays, numbers and strings as one HDF5 file, with the settings and versions that made it."""
+    import h5py
+
+    image = io.BytesIO()
+    with h5py.File(image, "w") as file:
+        file.attrs["format"] = FORMAT
+        file.attrs["program"] = f"fenchel {__version__}"
+        file.attrs["python"] = platform.python_version()
+        file.attrs["conventions"] = "SI units; tension positive; Mandel components (11, 22, 33, √2·23, √2·13, √2·12); frame first"
+        file.attrs["settings"] = json.dumps(settings, sort_keys=True)
+        for key, value in content.items():
+            _put(file, key, value)
+    replace_file(path, image.getvalue())
+
+
+def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Read (content, settings) of a run file; `InputError` when it is missing, truncated or of another kind."""
+    import h5py
+
+    path = Path(path)
+    try:
+        with h5py.File(path, "r") as file:
+            if "settings" not in file.attrs:
+                raise InputError(f"{path}: not a run file of fenchel (no settings in it): give a file written by `fenchel dem`")
+            if int(file.attrs["format"]) != FORMAT:
+                raise InputError(f"{path}: format {file.attrs['format']} is not {FORMAT}: run it again with this version")
+            content = _take(file)
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such run file: check the name") from None
+    except (OSError, RuntimeError, KeyError, ValueError) as error:
+        raise InputError(f"{path}: unreadable or truncated run file ({str(error).splitlines()[0]}): run it again") from None
+    settings = json.loads(content.pop("settings"))
+    for key in ("format", "program", "python", "conventions"):
+        content.pop(key, None)
+    return content, settings
