@@ -1,7 +1,7 @@
 """Directive `public-names`: everything in `__all__` of a module, by autodoc.
 
-    ```{public-names} fenchel.potentials
-    ```
+```{public-names} fenchel.potentials
+```
 """
 
 from __future__ import annotations
@@ -28,9 +28,12 @@ class PublicNames(SphinxDirective):
         lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
         for name in names:
             item = getattr(module, name)
+            home = getattr(item, "__module__", None) or module.__name__
+            if not f"{home}.".startswith(f"{module.__name__}."):
+                continue  # it has its path in another room
             if inspect.isclass(item):
                 lines += [f".. autoclass:: {module.__name__}.{name}", "   :members:", "   :show-inheritance:", ""]
-            elif callable(item) and not isinstance(item, type) and inspect.isroutine(item):
+            elif inspect.isroutine(item):
                 lines += [f".. autofunction:: {module.__name__}.{name}", ""]
         node = nodes.Element()
         node.document = self.state.document

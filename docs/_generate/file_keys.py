@@ -55,7 +55,7 @@ class FileKeys(SphinxDirective):
         identifier = nodes.make_id(f"{self.struct.__module__}-{self.struct.__name__}-{path or 'top'}")
         section = nodes.section("", nodes.title(text=title), ids=[identifier], names=[identifier])
         if struct.get("description"):
-            section += nodes.paragraph(text=struct["description"])
+            section += paragraph(struct["description"])
         tables, rows = [], []
         for key, schema in struct["properties"].items():
             inner = self.table_of(schema)
@@ -78,7 +78,13 @@ class FileKeys(SphinxDirective):
         if missing:
             raise self.error(f"{self.struct.__name__}: the key {key} has no description")
         default = "required" if required else json.dumps(schema.get("default"), ensure_ascii=False)
-        return key, self.kind(schema), schema.get("unit", schema.get("units", "")), default.replace("null", "–"), schema["description"]
+        return (
+            key,
+            self.kind(schema),
+            schema.get("unit", schema.get("units", "")),
+            default.replace("null", "–"),
+            schema["description"],
+        )
 
     def kind(self, schema: dict[str, Any]) -> str:
         schema = self.resolve(schema)
@@ -92,7 +98,7 @@ class FileKeys(SphinxDirective):
             word = " or ".join(NAMES.get(name, name) for name in schema["type"] if name != "null")
         else:
             word = NAMES.get(schema.get("type", ""), schema.get("type", "any"))
-        bounds = [text.format(f"{schema[name]:g}") for name, text in BOUNDS.items() if name in schema]
+        bounds = [text.format(schema[name]) for name, text in BOUNDS.items() if name in schema]
         return ", ".join([word, *bounds])
 
     def kind_of_array(self, schema: dict[str, Any]) -> str:
@@ -100,6 +106,15 @@ class FileKeys(SphinxDirective):
             return "[" + ", ".join(self.kind(item) for item in schema["prefixItems"]) + "]"
         items = schema.get("items")
         return f"list of {self.kind(items)}" if isinstance(items, dict) else "list"
+
+
+def paragraph(text: str) -> nodes.paragraph:
+    """A paragraph in which what stands between backticks is a literal."""
+    out = nodes.paragraph()
+    for place, piece in enumerate(text.split("`")):
+        if piece:
+            out += nodes.literal(text=piece) if place % 2 else nodes.Text(piece)
+    return out
 
 
 def table(rows: list[tuple[str, ...]]) -> nodes.table:
@@ -110,7 +125,9 @@ def table(rows: list[tuple[str, ...]]) -> nodes.table:
     head, body = nodes.thead(), nodes.tbody()
     head += line([nodes.Text(word) for word in HEADS])
     for key, kind, unit, default, meaning in rows:
-        body += line([nodes.literal(text=key), nodes.Text(kind), nodes.Text(unit), nodes.Text(default), nodes.Text(meaning)])
+        body += line(
+            [nodes.literal(text=key), nodes.Text(kind), nodes.Text(unit), nodes.Text(default), nodes.Text(meaning)]
+        )
     group += head
     group += body
     return nodes.table("", group)

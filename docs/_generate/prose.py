@@ -24,7 +24,9 @@ def inline(text: str) -> str:
         else:
             out.append(re.sub(r"([\\*|_])", r"\\\1", piece))
     joined = "".join(out)
-    return re.sub(r"(``)(?=\w)", r"\1\\ ", re.sub(r"(?<=\w)(``[^`]+``)", r"\\ \1", joined)) if "``" in joined else joined
+    return (
+        re.sub(r"(``)(?=\w)", r"\1\\ ", re.sub(r"(?<=\w)(``[^`]+``)", r"\\ \1", joined)) if "``" in joined else joined
+    )
 
 
 def paragraphs(lines: list[str]) -> list[list[str]]:
