@@ -1,11 +1,11 @@
 r"""From a densified sample to an isotropic state at a chosen pressure.
 
 A stage brings all three pairs of walls to a pressure (ramped, then held) under given laws, and ends when the sample is at rest: mean
-unbalanced force below 1 % of the mean contact force and wall stresses within 1 % of the pressure, for `calm` steps in a row.
+unbalanced force below 1 % of the mean contact force and wall stresses within 1 % of the pressure, for twenty steps in a row.
 Wires hold together during the compression (loose beads would be scattered: measured, links stretched to five spacings). Unless they are
-to be prestressed, their reference lengths then follow the present ones every twenty steps while friction comes on, so that tension
-dies out gently, and they are taken off before the last rest: the test with links and the control without start from one and the
-same state, at rest without them.
+to be prestressed, their reference lengths then follow the present ones every twenty steps while compression goes on, so that tension
+dies out gently and the packing densifies to rest without it; they are off when friction comes on. The test with links and the
+control without start from one and the same state, at rest without them.
 """
 
 from __future__ import annotations
@@ -45,10 +45,12 @@ class IsotropicStage:
         step_fraction: float = 0.05,
         slacken: bool = False,
         quench: float = 0.0,
+        to_rest: bool = True,
     ) -> None:
         self.simulation = Simulation(assembly, material, solver)
         self.name = name
         self.slacken = slacken
+        self.to_rest = to_rest
         self.quench_steps = round(quench / step_fraction)
         self.pressure = pressure
         self.before = pressure if pressure_before is None else pressure_before
@@ -59,7 +61,6 @@ class IsotropicStage:
         self.most = self.least + round(most / step_fraction)
         self.steps = 0
         self.calm = 0
-        self.measures: dict[str, float] = {}
 
     @property
     def assembly(self) -> Assembly:
@@ -68,16 +69,16 @@ class IsotropicStage:
 
     @property
     def done(self) -> bool:
-        """True when the sample has been at rest for twenty steps."""
-        return self.steps >= self.least and self.calm >= 20
+        """True when the least duration is over and, if asked for, the sample has been at rest for twenty steps."""
+        return self.steps >= self.least and (self.calm >= 20 or not self.to_rest)
 
     @property
     def fraction(self) -> float:
         """Share of the least duration that is behind."""
         return min(1.0, self.steps / self.least)
 
-    def advance(self) -> None:
-        """One step. Raises `ConvergenceError` when the sample does not come to rest in the longest duration."""
+    def advance(self) -> dict[str, float]:
+        """One step; returns its measures. Raises `ConvergenceError` when the sample does not come to rest in the longest duration."""
         share = min(1.0, (self.steps + 1) / self.ramp_steps) if self.ramp_steps else 1.0
         pressure = self.before + share * (self.pressure - self.before)
         a = self.assembly
@@ -86,17 +87,18 @@ class IsotropicStage:
             a.spin[:] = 0.0
         if self.slacken and self.steps % 20 == 0:
             a.release_links()
-        self.measures = self.simulation.advance(self.step, Drive(pressure=np.full(3, pressure)))
+        measures = self.simulation.advance(self.step, Drive(pressure=np.full(3, pressure)))
         self.steps += 1
         rows = self.simulation.contacts
         assert rows is not None
         off = np.max(np.abs(wall_stress(rows) / -pressure - 1.0))
-        self.calm = self.calm + 1 if self.measures["unbalanced"] < 1e-2 and off < 1e-2 and share >= 1.0 else 0
+        self.calm = self.calm + 1 if measures["unbalanced"] < 1e-2 and off < 1e-2 and share >= 1.0 else 0
         if self.steps >= self.most and not self.done:
             raise ConvergenceError(
-                f"{self.name}: not at rest after {self.steps} steps (unbalanced force {self.measures['unbalanced']:.1e} of the mean contact force, "
+                f"{self.name}: not at rest after {self.steps} steps (unbalanced force {measures['unbalanced']:.1e} of the mean contact force, "
                 f"wall pressure off by {100 * off:.2g} %): lower sample.solid_fraction or tighten sample.tolerance"
             )
+        return measures
 
     def state(self) -> dict[str, Any]:
         """What a checkpoint needs beside the assembly."""
@@ -155,15 +157,20 @@ def preparation(
     smooth = replace(law, friction=sample.friction, bead_friction=sample.friction)
     loose_beads = replace(law, links=law.links and prestressed)
     keep: dict[str, Any] = {"pressure": pressure, "density": grains.density}
-    free = not prestressed
+    slackening = [
+        IsotropicStage(
+            assembly, smooth, loose, name="slackening", least=60.0, step_fraction=2 * solve.step, slacken=True, to_rest=False, **keep
+        )
+    ]
+    if prestressed or not law.links:
+        slackening = []
     return [
         IsotropicStage(
             assembly, smooth, loose, name="compression", least=60.0, step_fraction=2 * solve.step, quench=10.0, **keep
         ),
-        IsotropicStage(
-            assembly, law, loose, name="friction on", least=20.0, step_fraction=solve.step, slacken=free, **keep
-        ),
-        IsotropicStage(assembly, loose_beads, tight, name="rest", least=20.0, step_fraction=solve.step, **keep),
+        *slackening,
+        IsotropicStage(assembly, loose_beads, loose, name="friction on", least=20.0, step_fraction=solve.step, **keep),
+        IsotropicStage(assembly, loose_beads, tight, name="rest", least=5.0, step_fraction=solve.step, **keep),
     ]
 
 

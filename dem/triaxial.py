@@ -61,6 +61,7 @@ class TriaxialTest:
         if not pressure > 0.0:
             raise InputError(f"pressure = {pressure} Pa: grains without cohesion need a positive confining pressure")
         self.simulation = Simulation(assembly, material, solver)
+        self.name = f"triaxial at {pressure / 1e3:g} kPa"
         self.pressure = pressure
         self.path = tuple(float(e) for e in strain_path)
         self.time_scale = inertial_time(assembly, pressure, density)
@@ -102,10 +103,8 @@ class TriaxialTest:
         walked = legs[: self.leg].sum() + min(abs(self.strain - self.path[self.leg]), legs[self.leg])
         return float(walked / legs.sum())
 
-    def advance(self) -> None:
-        """One step; a frame is stored at the start, every `frame_strain`, and at the end of each leg."""
-        if self.done:
-            return
+    def advance(self) -> dict[str, float]:
+        """One step, returns its measures; a frame is stored at the start, every `frame_strain`, and at the end of each leg."""
         target = self.path[self.leg + 1]
         heading = 1.0 if target > self.path[self.leg] else -1.0
         ramp = self.step / (3.0 * self.time_scale)
@@ -125,6 +124,7 @@ class TriaxialTest:
         last = self.frames["axial_strain"][-1] if self.frames["axial_strain"] else np.inf
         if reached or not np.abs(self.strain - last) < self.frame_strain * (1.0 - 1e-9):
             self._store(measures, leg)
+        return measures
 
     def _store(self, measures: dict[str, float], leg: int) -> None:
         rows = self.simulation.contacts
@@ -174,6 +174,30 @@ class TriaxialTest:
             quality=self._quality(f),
             settings=settings,
         )
+
+    def state(self) -> dict[str, Any]:
+        """What a checkpoint needs beside the assembly; `restore` makes the test go on bit for bit."""
+        return {
+            "leg": self.leg,
+            "speed": self.speed,
+            "steps": self.steps,
+            "start_half": self.start_half,
+            "start_x": self.start_x,
+            "sphere": self.sphere,
+            "sums": dict(self.sums),
+            "sweeps": self.simulation.total_sweeps,
+            "rows": self.simulation.total_rows,
+            "frames": {name: np.array(values) for name, values in self.frames.items()},
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Inverse of `state`."""
+        self.leg, self.steps = int(state["leg"]), int(state["steps"])
+        self.speed, self.sphere = float(state["speed"]), float(state["sphere"])
+        self.start_half, self.start_x = state["start_half"], state["start_x"]
+        self.sums = {name: float(state["sums"][name]) for name in _SUMMED}
+        self.simulation.total_sweeps, self.simulation.total_rows = int(state["sweeps"]), int(state["rows"])
+        self.frames = {name: list(state["frames"][name]) for name in self.frames}
 
     def _quality(self, f: dict[str, Array]) -> dict[str, float]:
         a, law = self.assembly, self.simulation.material

@@ -1,0 +1,192 @@
+"""Runs: a list of stages walked to the end, with progress, checkpoints that resume bit for bit, and a record at the end.
+
+The run file is the checkpoint: it is replaced atomically while the run goes on and holds the record when it is over.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from pathlib import Path
+from typing import Any, Protocol
+
+import msgspec
+import numpy as np
+
+from ..errors import InputError
+from .bodies import Assembly
+from .preparation import make_sample, material_of, preparation
+from .record import TriaxialRecord
+from .scene import Scene, read_scene
+from .storage import load_run, save_run
+from .stepping import Solver
+from .triaxial import TriaxialTest
+
+__all__ = ["Progress", "load_record", "record_content", "run_scene", "walk"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Progress:
+    """What a progress bar shows."""
+
+    stage: str
+    fraction: float  # of all stages
+    step: int
+    strain: float
+    residual: float  # natural map of the last step
+    kinetic: float  # kinetic energy [J]
+
+
+class Stage(Protocol):
+    """A part of a run that advances step by step and can be put aside and taken up again."""
+
+    name: str
+    steps: int
+
+    @property
+    def done(self) -> bool: ...
+    @property
+    def fraction(self) -> float: ...
+    @property
+    def assembly(self) -> Assembly: ...
+    def advance(self) -> dict[str, float]: ...
+    def state(self) -> dict[str, Any]: ...
+    def restore(self, state: dict[str, Any]) -> None: ...
+
+
+def walk(
+    stage: Stage,
+    *,
+    share: tuple[float, float] = (0.0, 1.0),
+    progress: Callable[[Progress], None] | None = None,
+    checkpoint: Callable[[], None] | None = None,
+    every: float = 30.0,
+) -> None:
+    """Advance a stage to its end; `share` is its part of the whole for the bar, `every` [s] the pace of checkpoints."""
+    shown = 0.0
+    saved = time.monotonic()
+    while not stage.done:
+        measures = stage.advance()
+        now = time.monotonic()
+        if progress is not None and now - shown > 0.25:
+            shown = now
+            progress(
+                Progress(
+                    stage=stage.name,
+                    fraction=share[0] + (share[1] - share[0]) * stage.fraction,
+                    step=stage.steps,
+                    strain=getattr(stage, "strain", 0.0),
+                    residual=measures["natural_map"],
+                    kinetic=measures["kinetic"],
+                )
+            )
+        if checkpoint is not None and now - saved > every:
+            checkpoint()
+            # a checkpoint may not take more than a twentieth of the time
+            took = time.monotonic() - now
+            saved = now + took
+            every = max(every, 20.0 * took)
+
+
+def run_scene(
+    scene_file: Path | str | Scene,
+    run_file: Path | str,
+    *,
+    resume: bool = False,
+    progress: Callable[[Progress], None] | None = None,
+    every: float = 30.0,
+) -> TriaxialRecord:
+    """Make the sample, test it, and leave everything in `run_file`.
+
+    With `resume` an interrupted run goes on from its last checkpoint, bit for bit; the scene must be the one that started it. Raises
+    `InputError` for a bad scene or run file, `ConvergenceError` for an unconverged step, `StorageError` when the file cannot be written.
+    """
+    scene = scene_file if isinstance(scene_file, Scene) else read_scene(scene_file)
+    settings = {"scene": msgspec.to_builtins(scene)}
+    run_file = Path(run_file)
+    if run_file.exists() and not resume:
+        raise InputError(f"{run_file}: exists already; say --resume to go on with it, or choose another name")
+    stages, state = _stages(scene), {}
+    at = 0
+    if resume and run_file.exists():
+        content, before = load_run(run_file)
+        if before != settings:
+            raise InputError(f"{run_file}: was started from another scene; resume it with the scene stored in it")
+        if "record" in content:
+            return _record(content["record"], before)
+        at, state = int(content["stage"]), content["state"]
+        assembly = Assembly.from_arrays(content["assembly"])
+    else:
+        assembly = make_sample(scene.grains, scene.wires, scene.sample, scene.seed)
+        save_run(run_file, {"stage": 0, "state": {}, "assembly": assembly.arrays()}, settings)
+    for k in range(at, len(stages)):
+        stage = stages[k](assembly)
+        if state:
+            stage.restore(state)
+            state = {}
+
+        def checkpoint(k: int = k, stage: Stage = stage) -> None:
+            save_run(run_file, {"stage": k, "state": stage.state(), "assembly": assembly.arrays()}, settings)
+
+        walk(
+            stage,
+            share=(k / len(stages), (k + 1) / len(stages)),
+            progress=progress,
+            checkpoint=checkpoint,
+            every=every,
+        )
+    test = stage
+    assert isinstance(test, TriaxialTest)
+    record = test.record(seed=scene.seed, settings=settings)
+    save_run(run_file, {"record": record_content(record), "assembly": assembly.arrays()}, settings)
+    return record
+
+
+def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
+    """Makers of the stages of a scene: a stage is made when its turn comes, from the assembly as it is then."""
+
+    def prepared(k: int) -> Callable[[Assembly], Stage]:
+        return lambda assembly: preparation(
+            assembly, scene.grains, scene.wires, scene.sample, scene.solve, scene.triaxial.pressure
+        )[k]
+
+    def test(assembly: Assembly) -> Stage:
+        t = scene.triaxial
+        return TriaxialTest(
+            assembly,
+            material_of(scene.grains, scene.wires),
+            Solver(tolerance=scene.solve.tolerance, sweep_limit=scene.solve.sweep_limit),
+            pressure=t.pressure,
+            density=scene.grains.density,
+            strain_path=t.strain_path,
+            inertial_number=t.inertial_number,
+            step_fraction=scene.solve.step,
+            sphere=t.sphere,
+            frame_strain=t.frame_strain,
+            prestressed=scene.wires is not None and scene.wires.state == "prestressed",
+        )
+
+    dummy = Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1), np.ones(3))
+    count = len(preparation(dummy, scene.grains, scene.wires, scene.sample, scene.solve, scene.triaxial.pressure))
+    return [*(prepared(k) for k in range(count)), test]
+
+
+def record_content(record: TriaxialRecord) -> dict[str, Any]:
+    """A record as a nested dictionary for storage (settings are stored beside it)."""
+    return {f.name: getattr(record, f.name) for f in fields(record) if f.name != "settings"}
+
+
+def _record(content: dict[str, Any], settings: dict[str, Any]) -> TriaxialRecord:
+    return TriaxialRecord(**content, settings=settings)
+
+
+def load_record(path: Path | str) -> TriaxialRecord:
+    """The record of a finished run; `InputError` when the file is unreadable or the run not finished."""
+    content, settings = load_run(path)
+    if "record" not in content:
+        raise InputError(f"{path}: the run is not finished; go on with `fenchel dem ... --resume`")
+    try:
+        return _record(content["record"], settings)
+    except TypeError:
+        raise InputError(f"{path}: the record is incomplete; run it again") from None
