@@ -1,8 +1,26 @@
 """Integrators: the implicit step of a declared law as a convex projection, its tangent, and paths of material points."""
 
 from ..errors import ConvergenceError
+from .conic import ConicSolution, ConicStep, conic_step
+from .driver import drive
 from .history import History, drive_arrays
 from .module_store import module_source
+from .path_file import StrainStressPath, read_path, write_history
 from .update import StepResult, Update, build_update
 
-__all__ = ["ConvergenceError", "History", "StepResult", "Update", "build_update", "drive_arrays", "module_source"]
+__all__ = [
+    "ConicSolution",
+    "ConicStep",
+    "ConvergenceError",
+    "History",
+    "StepResult",
+    "StrainStressPath",
+    "Update",
+    "build_update",
+    "conic_step",
+    "drive",
+    "drive_arrays",
+    "module_source",
+    "read_path",
+    "write_history",
+]

@@ -1,0 +1,164 @@
+"""The implicit step as a conic program: the incremental variational principle, declared through cvxpy.
+
+    min ψ(ε, X) + φ(X − X_n)   over ε, X   subject to   ε = ε_{n+1},
+
+where φ, the support function of {f_j ≤ 0}, is written with multipliers: for f_j = Σ_i a_ji ‖L_ji A‖ + ℓ_j(A) − k_j,
+
+    φ(Δ) = min Σ_j k_j γ_j   subject to   Δ = Σ_j (γ_j ∇ℓ_j + Σ_i L_jiᵀ D_ji),  ‖D_ji‖ ≤ a_ji γ_j.
+
+The stress is the multiplier of ε = ε_{n+1}. Built from the declared atoms of ψ and φ*, independently of the closed form: quadratic terms by
+a factor of their Hessian, ⟨x⟩² as a squared positive part, T^≥:T^≥ as min ‖W‖² over W ⪰ T, W ⪰ 0. Strains are counted in a yield strain
+and stresses in a yield stress, so that the program is well conditioned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import ConvergenceError, DeclarationError, InputError
+from ..potentials import Law
+from .atoms import ConvexAtoms, FlowAtoms, energy_atoms, flow_atoms
+from .closed import state_layout
+
+__all__ = ["ConicSolution", "ConicStep", "conic_step"]
+
+
+@dataclass(frozen=True)
+class ConicSolution:
+    """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` [J/m³], status text of the solver."""
+
+    stress: np.ndarray
+    state: dict[str, Any]
+    objective: float
+    status: str
+
+
+@dataclass(frozen=True)
+class ConicStep:
+    """The declared program of one step at one point; `.problem` is the cvxpy problem, in scaled units."""
+
+    law: Law
+    problem: Any
+    strain_constraint: Any
+    state_variable: Any
+    old: np.ndarray
+    strain_unit: float
+    energy_unit: float
+    offset: float
+
+    def solve(self, **options: Any) -> ConicSolution:
+        """Solve by clarabel; `options` go to the solver. Raises `ConvergenceError` if no solution is found."""
+        settings = {
+            "tol_gap_abs": 1e-11,
+            "tol_gap_rel": 1e-11,
+            "tol_feas": 1e-11,
+            "tol_ktratio": 1e-9,
+            "reduced_tol_gap_abs": 1e-7,
+            "reduced_tol_gap_rel": 1e-7,
+            "reduced_tol_feas": 1e-7,
+            "max_iter": 200,
+            **options,
+        }
+        import warnings
+
+        import cvxpy
+
+        try:
+            with warnings.catch_warnings():
+                # the tolerances are set beyond what is always reached; the reduced ones above bound what is accepted
+                warnings.simplefilter("ignore", UserWarning)
+                self.problem.solve(solver=cvxpy.CLARABEL, **settings)
+        except cvxpy.error.SolverError as error:
+            raise ConvergenceError(f"law '{self.law.name}': clarabel fails on the step: {str(error).splitlines()[0]}") from None
+        if self.problem.status not in ("optimal", "optimal_inaccurate"):
+            raise ConvergenceError(f"law '{self.law.name}': clarabel ends with status '{self.problem.status}'")
+        sign = -1.0
+        stress = sign * np.asarray(self.strain_constraint.dual_value).reshape(6) * self.energy_unit / self.strain_unit
+        change = np.zeros(0) if self.state_variable is None else np.asarray(self.state_variable.value).reshape(-1) * self.strain_unit
+        packed = self.old + change
+        layout, _ = state_layout(self.law)
+        state = {n: packed[s] if length == 1 else packed[s : s + 6] for n, (s, length) in layout.items()}
+        return ConicSolution(stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status)
+
+
+def conic_step(law: Law, eps_new: Any, state: Mapping[str, Any] | None, values: Mapping[str, Any]) -> ConicStep:
+    """Declare the program of one step at one point: strain (6,), `state` by name or None, parameters by name.
+
+    Raises `InputError` for bad input and `DeclarationError` where an atom of the law has no conic form.
+    """
+    eps = np.asarray(eps_new, dtype=float).reshape(-1)
+    if eps.shape != (6,) or not np.isfinite(eps).all():
+        raise InputError(f"conic: the strain has shape {np.shape(eps_new)}; it must be six finite Mandel components")
+    law.check_evolution()
+    numbers = law.values(values)
+    layout, size = state_layout(law)
+    old = np.zeros(size)
+    for name, (start, length) in layout.items():
+        if state is not None:
+            if name not in state:
+                raise InputError(f"law '{law.name}': the state lacks the internal variable '{name}'")
+            old[start : start + length] = np.asarray(state[name], dtype=float).reshape(length)
+    return declare(law, energy_atoms(law, numbers), flow_atoms(law, numbers), eps, old)
+
+
+def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old: np.ndarray) -> ConicStep:
+    """The cvxpy problem, in units of `strain_unit` and `energy_unit`."""
+    import cvxpy as cp
+
+    size = old.size
+    stiffness = float(np.abs(np.diag(energy.hessian)).max(initial=0.0)) or max((w for w, *_ in energy.spectral), default=1.0) or 1.0
+    limit = max((abs(k) for k in flow.limits), default=0.0)
+    point = np.concatenate([eps, old])
+    force = energy.hessian @ point + energy.linear
+    # the unit of strain follows the size of the step; the yield strain bounds it from below
+    strain_unit = max(limit / stiffness, float(np.abs(force).max(initial=0.0)) / stiffness, float(np.abs(eps).max(initial=0.0))) or 1.0
+    energy_unit = stiffness * strain_unit**2
+    x_eps = cp.Variable(6)
+    x_new = cp.Variable(size) if size else None
+    change = x_eps if x_new is None else cp.hstack([x_eps, x_new])
+    base = np.concatenate([eps, old])
+    # variables: ε = eps + (x_eps) u, X = old + (x_new) u; quadratic part expanded about the base point
+    values, vectors = np.linalg.eigh(energy.hessian / stiffness)
+    if values.min(initial=0.0) < -1e-9 * max(1.0, values.max(initial=0.0)):
+        raise DeclarationError(f"law '{law.name}': the quadratic part of psi is not convex for these values")
+    keep = values > 1e-14 * max(values.max(initial=0.0), 1e-300)
+    factor = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
+    slope = force * strain_unit / energy_unit
+    objective = 0.5 * cp.sum_squares(factor @ change) + slope @ change
+    offset = 0.5 * base @ energy.hessian @ base + energy.linear @ base + energy.constant
+    constraints: list[Any] = []
+    for weight, row, shift in energy.positive:
+        start = (row @ base + shift) / strain_unit
+        objective = objective + (weight * strain_unit**2 / energy_unit) * cp.square(cp.pos(row @ change + start))
+    for weight, coefficient, shift in energy.spectral:
+        target = coefficient * x_eps + (coefficient * eps + shift) / strain_unit
+        part = cp.Variable((3, 3), symmetric=True)
+        constraints += [part >> 0, part - _matrix(cp, target) >> 0]
+        objective = objective + (weight * strain_unit**2 / energy_unit) * cp.sum_squares(part)
+    if x_new is not None:
+        gamma = cp.Variable(len(flow.limits))
+        constraints.append(gamma >= 0)
+        total: Any = 0
+        for j, (linear, norms) in enumerate(zip(flow.linear, flow.norms, strict=True)):
+            total = total + gamma[j] * linear
+            for a, operator in norms:
+                direction = cp.Variable(6)
+                constraints.append(cp.norm(direction, 2) <= a * gamma[j])
+                total = total + operator.T @ direction
+        constraints.append(x_new == total)
+        objective = objective + (np.array(flow.limits) * strain_unit / energy_unit) @ gamma
+    fixed = x_eps == np.zeros(6)
+    problem = cp.Problem(cp.Minimize(objective), [fixed, *constraints])
+    return ConicStep(law, problem, fixed, x_new, old, strain_unit, energy_unit, float(offset))
+
+
+def _matrix(cp: Any, mandel: Any) -> Any:
+    half = np.sqrt(0.5)
+    a, b, c = mandel[0], mandel[1], mandel[2]
+    f, e, d = half * mandel[3], half * mandel[4], half * mandel[5]
+    return cp.bmat([[a, d, e], [d, b, f], [e, f, c]])
+

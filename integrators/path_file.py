@@ -1,0 +1,146 @@
+"""Path and history files: comma-separated, plain tensor components (shear not doubled), tension positive, SI units.
+
+`PATH.csv` has a column `t` [s] and, per component, at most one of `eps_xx` (prescribed strain [-]) and `sig_xx` (prescribed stress
+[Pa]); a component without column has zero stress. A column `eps_v` (volume strain [-]) or `p` (mean pressure [Pa]) takes the place of the
+normal components without column, which then share one stress. The first row is the virgin state and zero.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..errors import InputError, StorageError
+from .history import History
+
+__all__ = ["COMPONENTS", "StrainStressPath", "read_path", "write_history"]
+
+COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
+MANDEL = np.array([1.0, 1.0, 1.0, math.sqrt(2.0), math.sqrt(2.0), math.sqrt(2.0)])
+_KNOWN = ("t", *(f"eps_{c}" for c in COMPONENTS), *(f"sig_{c}" for c in COMPONENTS), "eps_v", "p", "T")
+
+
+@dataclass(frozen=True)
+class StrainStressPath:
+    """Prescribed path: `time` (n,); `control` (6,) True where stress is prescribed; `targets` (n, 6) Mandel; trace condition."""
+
+    time: np.ndarray
+    control: np.ndarray
+    targets: np.ndarray
+    trace: str | None = None
+    trace_targets: np.ndarray | None = None
+
+
+def read_path(file: str | Path) -> StrainStressPath:
+    """Read `PATH.csv`. `InputError` names the file, the row (header is row 1) and the column."""
+    path = Path(file)
+    try:
+        rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise InputError(f"path file '{path}' cannot be read: {reason}") from None
+    rows = [(i, row) for i, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
+    if not rows:
+        raise InputError(f"path file '{path}' is empty; it needs a header such as 't,eps_zz,sig_xx,sig_yy' and rows of numbers")
+    header = [cell.strip() for cell in rows[0][1]]
+    _check_header(path, header)
+    if len(rows) < 2:
+        raise InputError(f"path file '{path}' has a header but no row")
+    table = np.array([_numbers(path, number, header, row) for number, row in rows[1:]])
+    first = rows[1][0]
+    for name, value in zip(header, table[0], strict=True):
+        if name not in ("t", "T") and value != 0.0:
+            raise InputError(f"path file '{path}', row {first}, column '{name}': the first row is the virgin state and must be zero, not {value:g}")
+    time = table[:, header.index("t")]
+    late = np.flatnonzero(np.diff(time) <= 0)
+    if late.size:
+        raise InputError(f"path file '{path}', row {rows[2 + late[0]][0]}, column 't': the time must increase, it is {time[late[0] + 1]:g}")
+    return _path(header, table, time)
+
+
+def _check_header(path: Path, header: list[str]) -> None:
+    where = f"path file '{path}', row 1"
+    for name in header:
+        if name not in _KNOWN:
+            raise InputError(f"{where}: unknown column '{name}'; a path has: {', '.join(_KNOWN)}")
+        if header.count(name) > 1:
+            raise InputError(f"{where}: the column '{name}' stands twice")
+    if "t" not in header:
+        raise InputError(f"{where}: the column 't' is missing")
+    for c in COMPONENTS:
+        if f"eps_{c}" in header and f"sig_{c}" in header:
+            raise InputError(f"{where}: both 'eps_{c}' and 'sig_{c}' are given; prescribe one of them")
+    if "T" in header:
+        raise InputError(f"{where}: column 'T': the laws have no temperature; take the column out")
+    if "eps_v" in header and "p" in header:
+        raise InputError(f"{where}: both 'eps_v' and 'p' are given; one of them may replace one component")
+    for name in ("eps_v", "p"):
+        if name in header and all(f"eps_{c}" in header or f"sig_{c}" in header for c in COMPONENTS[:3]):
+            raise InputError(f"{where}: '{name}' replaces a normal component; leave out the column of one of xx, yy, zz")
+
+
+def _numbers(path: Path, number: int, header: list[str], row: list[str]) -> list[float]:
+    if len(row) != len(header):
+        raise InputError(f"path file '{path}', row {number}: {len(row)} cells under {len(header)} columns")
+    found = []
+    for name, cell in zip(header, row, strict=True):
+        try:
+            value = float(cell)
+        except ValueError:
+            raise InputError(f"path file '{path}', row {number}, column '{name}': {cell.strip()!r} is not a number") from None
+        if not math.isfinite(value):
+            raise InputError(f"path file '{path}', row {number}, column '{name}': {cell.strip()} is not finite")
+        found.append(value)
+    return found
+
+
+def _path(header: list[str], table: np.ndarray, time: np.ndarray) -> StrainStressPath:
+    control, targets = np.ones(6, dtype=bool), np.zeros((len(time), 6))
+    trace = next((name for name in ("eps_v", "p") if name in header), None)
+    for i, c in enumerate(COMPONENTS):
+        for kind in ("eps", "sig"):
+            if f"{kind}_{c}" in header:
+                control[i] = kind == "sig"
+                targets[:, i] = table[:, header.index(f"{kind}_{c}")] * MANDEL[i]
+        if trace is not None and i < 3 and f"eps_{c}" not in header and f"sig_{c}" not in header:
+            targets[:, i] = np.nan
+    condition = None if trace is None else table[:, header.index(trace)]
+    return StrainStressPath(time, control, targets, trace, condition)
+
+
+def write_history(file: str | Path, history: History, time: Any = None) -> None:
+    """Write `OUT.csv`: t, eps_*, sig_*, eps_v, p, q, internal variables, psi, dissipation, status.
+
+    `p` is the mean pressure −tr σ/3 and `q` = √(3 J₂). A scalar internal variable whose name is taken is written as `internal_<name>`.
+    """
+    columns = history_columns(history, time)
+    lines = [",".join(columns)]
+    for row in zip(*columns.values(), strict=True):
+        lines.append(",".join(repr(float(v)) if not isinstance(v, (int, np.integer)) else str(int(v)) for v in row))
+    try:
+        Path(file).write_text("\n".join(lines) + "\n", encoding="utf-8")
+    except OSError as error:
+        raise StorageError(f"cannot write '{file}': {error.strerror}") from None
+
+
+def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]:
+    """Columns of `OUT.csv` by name."""
+    n = len(history.psi)
+    columns: dict[str, np.ndarray] = {"t": np.arange(n, dtype=float) if time is None else np.asarray(time, dtype=float)}
+    for kind, values in (("eps", history.eps), ("sig", history.sig)):
+        columns |= {f"{kind}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
+    mean = history.sig[:, :3].sum(axis=1) / 3.0
+    deviator = history.sig - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    columns |= {"eps_v": history.eps[:, :3].sum(axis=1), "p": -mean, "q": np.sqrt(1.5) * np.linalg.norm(deviator, axis=1)}
+    ends = {"psi": history.psi, "dissipation": history.dissipation, "status": history.status}
+    for name, values in history.state.items():
+        if values.ndim == 2:
+            columns |= {f"{name}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
+        else:
+            columns[f"internal_{name}" if name in columns or name in ends else name] = values
+    return columns | ends
