@@ -231,16 +231,29 @@ def _printed(tensor: SymmetricTensor, printer: Any, latex: bool) -> str:
     terms = tensor.terms()
     if not terms:
         return r"\boldsymbol{0}" if latex else "0"
-    if all(isinstance(a, Deviator) for a in terms):
+    if all(isinstance(a, Deviator) for a in terms) and (len(set(terms.values())) > 1 or set(terms.values()) == {S.One}):
         inside = printer._print(from_terms({a.args[0]: c for a, c in terms.items()}))  # type: ignore[misc]
         return rf"\mathrm{{dev}}\left({inside}\right)" if latex else f"dev({inside})"
-    text = ""
+    devs = {a: c for a, c in terms.items() if isinstance(a, Deviator)}
+    if len(devs) > 1 and len(set(devs.values())) == 1:
+        # one factor for the deviator of the sum, as it was declared
+        joined = Deviator(from_terms({a.args[0]: S.One for a in devs}))  # type: ignore[misc]
+        inside = printer._print(joined)
+        terms = {a: c for a, c in terms.items() if a not in devs}
+        text = _term("", next(iter(devs.values())), inside, printer, latex)
+    else:
+        text = ""
     for atom, c in sorted(terms.items(), key=lambda pair: (isinstance(pair[0], IdentityTensor), default_sort_key(pair[0]))):
-        negative = c.could_extract_minus_sign()
-        size = -c if negative else c
-        factor = printer._print(size)
-        if size.is_Add:
-            factor = rf"\left({factor}\right)" if latex else f"({factor})"
-        body = printer._print(atom) if size == 1 else f"{factor}{' ' if latex else '*'}{printer._print(atom)}"
-        text += (" - " if text else "-") + body if negative else (" + " if text else "") + body
+        text = _term(text, c, printer._print(atom), printer, latex)
     return text
+
+
+def _term(text: str, c: Expr, body: str, printer: Any, latex: bool) -> str:
+    """`text` with the term c·body appended."""
+    negative = c.could_extract_minus_sign()
+    size = -c if negative else c
+    factor = printer._print(size)
+    if size.is_Add:
+        factor = rf"\left({factor}\right)" if latex else f"({factor})"
+    shown = body if size == 1 else f"{factor}{' ' if latex else '*'}{body}"
+    return text + (" - " if text else "-") + shown if negative else text + (" + " if text else "") + shown
