@@ -17,16 +17,16 @@ BULLET = re.compile(r"[*-] ")
 
 def inline(text: str) -> str:
     """One paragraph with everything that reStructuredText would take for markup escaped."""
-    out = []
-    for place, piece in enumerate(text.split("`")):
-        if place % 2:
-            out.append(f"``{piece}``" if piece.strip() == piece and piece else piece)
+    pieces = text.split("`")
+    out = ""
+    for place, piece in enumerate(pieces):
+        if place % 2 and place < len(pieces) - 1 and piece and piece == piece.strip():
+            before, after = pieces[place - 1][-1:], pieces[place + 1][:1]
+            glue = (r"\ " if before.strip() else "", r"\ " if after.strip() else "")
+            out += f"{glue[0]}``{piece}``{glue[1]}"
         else:
-            out.append(re.sub(r"([\\*|_])", r"\\\1", piece))
-    joined = "".join(out)
-    return (
-        re.sub(r"(``)(?=\w)", r"\1\\ ", re.sub(r"(?<=\w)(``[^`]+``)", r"\\ \1", joined)) if "``" in joined else joined
-    )
+            out += re.sub(r"([\\*|_`])", r"\\\1", piece)
+    return out
 
 
 def paragraphs(lines: list[str]) -> list[list[str]]:
@@ -38,7 +38,8 @@ def paragraphs(lines: list[str]) -> list[list[str]]:
             continue
         last = found[-1]
         bulleted = bool(last) and bool(BULLET.match(last[0]))
-        if last and ((text[0] == " ") != (last[-1][0] == " ") and not bulleted or BULLET.match(text)):
+        turned = bool(last) and (text[0] == " ") != (last[-1][0] == " ") and not bulleted
+        if turned or (last and BULLET.match(text)):
             found.append([])
         found[-1].append(text)
     return [paragraph for paragraph in found if paragraph]

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import typer
 
-__all__ = ["Formulation", "Split", "register"]
+from .values import PARAMETERS, VALUES, parameter_values
+
+__all__ = ["LAW", "Formulation", "Split", "register"]
 
 LAW = typer.Argument(
     ..., metavar="LAW", help="A name of the library, or file.py:name; such a file is run as the Python that it is."
@@ -101,8 +103,8 @@ def _show(
 
 def _check(
     law: str = LAW,
-    values: list[str] = typer.Option([], "-p", metavar="NAME=VALUE", help="A parameter; may be repeated."),
-    parameters: Path | None = typer.Option(None, "--parameters", metavar="P.toml", help="Parameters from a file."),
+    pairs: list[str] = VALUES,
+    parameters: Path | None = PARAMETERS,
     json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
     """Whether a law is admissible: exit code 0 if proved, 1 if refuted or undecided, 2 if it is not a valid declaration.
@@ -112,9 +114,8 @@ def _check(
     from fenchel.potentials import load_law
 
     from .tables import print_json
-    from .values import parameter_values
 
-    report = load_law(law).check(**parameter_values(values, parameters))
+    report = load_law(law).check(**parameter_values(pairs, parameters))
     verdict = {True: "proved", False: "refuted", None: "undecided"}[report.admissible]
     conditions = [str(item) for item in report.conditions]
     reasons = [str(item) for item in report.reasons]

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-__all__ = ["number", "print_json", "print_table"]
+__all__ = ["csv_text", "number", "print_json", "print_table"]
 
 _WIDTH_OF_A_FILE = 140
 
@@ -34,6 +34,16 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, tit
     for row in rows:
         table.add_row(*(Text(number(cell) if isinstance(cell, float) else str(cell)) for cell in row))
     console.print(table)
+
+
+def csv_text(columns: Mapping[str, Any]) -> str:
+    """Columns (arrays of one length, by name) as comma-separated text; every number reads back as the same one.
+
+    >>> csv_text({"t": [0.0, 0.1], "status": [0, 0]})
+    't,status\\n0.0,0\\n0.1,0\\n'
+    """
+    rows = zip(*(column.tolist() if hasattr(column, "tolist") else column for column in columns.values()), strict=True)
+    return "".join(f"{','.join(map(str, row))}\n" for row in [tuple(columns), *rows])
 
 
 def number(value: float) -> str:

@@ -5,9 +5,14 @@ from __future__ import annotations
 import math
 from pathlib import Path
 
+import typer
+
 from ..errors import InputError
 
-__all__ = ["parameter_values"]
+__all__ = ["PARAMETERS", "VALUES", "parameter_values"]
+
+VALUES = typer.Option([], "-p", metavar="NAME=VALUE", help="A parameter of the law; may be repeated.")
+PARAMETERS = typer.Option(None, "--parameters", metavar="P.toml", help="Parameters from a file of NAME = VALUE lines.")
 
 
 def parameter_values(pairs: list[str], file: Path | None = None) -> dict[str, float]:
