@@ -6,7 +6,7 @@ The run file is the checkpoint: it is replaced atomically while the run goes on 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, Protocol
@@ -23,7 +23,9 @@ from .storage import load_run, save_run
 from .stepping import Solver
 from .triaxial import TriaxialTest
 
-__all__ = ["Progress", "load_record", "record_content", "run_scene", "walk"]
+__all__ = [
+    "Progress", "Stage", "finished_test", "load_record", "record_content", "record_of", "run_scene", "run_stages", "walk",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -89,6 +91,52 @@ def walk(
             every = max(every, 20.0 * took)
 
 
+def run_stages(
+    makers: Sequence[Callable[[Assembly], Stage]],
+    begin: Callable[[], Assembly],
+    run_file: Path | str,
+    settings: dict[str, Any],
+    finish: Callable[[Assembly, Stage], dict[str, Any]],
+    *,
+    progress: Callable[[Progress], None] | None = None,
+    every: float = 30.0,
+) -> dict[str, Any]:
+    """Walk stages one after the other from `begin()`, or from where `run_file` stands; returns the content of the finished file.
+
+    A stage is made when its turn comes, from the assembly as it is then. Raises `InputError` when the file is unreadable or belongs to
+    other settings, `StorageError` when it cannot be written.
+    """
+    run_file = Path(run_file)
+    at, state = 0, {}
+    if run_file.exists():
+        content, before = load_run(run_file)
+        if before != settings:
+            raise InputError(f"{run_file}: was started with other settings; choose another place, or remove it")
+        if "stage" not in content:
+            return content
+        at, state = int(content["stage"]), content["state"]
+        assembly = Assembly.from_arrays(content["assembly"])
+    else:
+        assembly = begin()
+        save_run(run_file, {"stage": 0, "state": {}, "assembly": assembly.arrays()}, settings)
+    stage: Stage | None = None
+    for k in range(at, len(makers)):
+        stage = makers[k](assembly)
+        if state:
+            stage.restore(state)
+            state = {}
+
+        def checkpoint(k: int = k, stage: Stage = stage) -> None:
+            save_run(run_file, {"stage": k, "state": stage.state(), "assembly": assembly.arrays()}, settings)
+
+        share = (k / len(makers), (k + 1) / len(makers))
+        walk(stage, share=share, progress=progress, checkpoint=checkpoint, every=every)
+    assert stage is not None
+    content = finish(assembly, stage)
+    save_run(run_file, content, settings)
+    return content
+
+
 def run_scene(
     scene_file: Path | str | Scene,
     run_file: Path | str,
@@ -104,43 +152,24 @@ def run_scene(
     """
     scene = scene_file if isinstance(scene_file, Scene) else read_scene(scene_file)
     settings = {"scene": msgspec.to_builtins(scene)}
-    run_file = Path(run_file)
-    if run_file.exists() and not resume:
+    if Path(run_file).exists() and not resume:
         raise InputError(f"{run_file}: exists already; say --resume to go on with it, or choose another name")
-    stages, state = _stages(scene), {}
-    at = 0
-    if resume and run_file.exists():
-        content, before = load_run(run_file)
-        if before != settings:
-            raise InputError(f"{run_file}: was started from another scene; resume it with the scene stored in it")
-        if "record" in content:
-            return _record(content["record"], before)
-        at, state = int(content["stage"]), content["state"]
-        assembly = Assembly.from_arrays(content["assembly"])
-    else:
-        assembly = make_sample(scene.grains, scene.wires, scene.sample, scene.seed)
-        save_run(run_file, {"stage": 0, "state": {}, "assembly": assembly.arrays()}, settings)
-    for k in range(at, len(stages)):
-        stage = stages[k](assembly)
-        if state:
-            stage.restore(state)
-            state = {}
+    content = run_stages(
+        _stages(scene),
+        lambda: make_sample(scene.grains, scene.wires, scene.sample, scene.seed),
+        run_file,
+        settings,
+        lambda assembly, stage: finished_test(assembly, stage, scene.seed),
+        progress=progress,
+        every=every,
+    )
+    return record_of(content, settings)
 
-        def checkpoint(k: int = k, stage: Stage = stage) -> None:
-            save_run(run_file, {"stage": k, "state": stage.state(), "assembly": assembly.arrays()}, settings)
 
-        walk(
-            stage,
-            share=(k / len(stages), (k + 1) / len(stages)),
-            progress=progress,
-            checkpoint=checkpoint,
-            every=every,
-        )
-    test = stage
-    assert isinstance(test, TriaxialTest)
-    record = test.record(seed=scene.seed, settings=settings)
-    save_run(run_file, {"record": record_content(record), "assembly": assembly.arrays()}, settings)
-    return record
+def finished_test(assembly: Assembly, stage: Stage, seed: int) -> dict[str, Any]:
+    """Content of the run file of a finished test: the record and the last state."""
+    assert isinstance(stage, TriaxialTest)
+    return {"record": record_content(stage.record(seed=seed, settings={})), "assembly": assembly.arrays()}
 
 
 def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
@@ -177,8 +206,9 @@ def record_content(record: TriaxialRecord) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(record) if f.name != "settings"}
 
 
-def _record(content: dict[str, Any], settings: dict[str, Any]) -> TriaxialRecord:
-    return TriaxialRecord(**content, settings=settings)
+def record_of(content: dict[str, Any], settings: dict[str, Any]) -> TriaxialRecord:
+    """The record in the content of a finished run."""
+    return TriaxialRecord(**content["record"], settings=settings)
 
 
 def load_record(path: Path | str) -> TriaxialRecord:
@@ -187,6 +217,6 @@ def load_record(path: Path | str) -> TriaxialRecord:
     if "record" not in content:
         raise InputError(f"{path}: the run is not finished; go on with `fenchel dem ... --resume`")
     try:
-        return _record(content["record"], settings)
+        return record_of(content, settings)
     except TypeError:
         raise InputError(f"{path}: the record is incomplete; run it again") from None

@@ -71,8 +71,7 @@ class TriaxialTest:
         self.start_half = assembly.half.copy()
         self.start_x = assembly.x.copy()
         self.sphere = sphere * float(assembly.half.min())
-        if not prestressed:
-            assembly.release_links()
+        self.prestressed = prestressed
         self.leg = 0
         self.speed = 0.0  # present strain rate over the nominal one, signed
         self.steps = 0
@@ -105,6 +104,8 @@ class TriaxialTest:
 
     def advance(self) -> dict[str, float]:
         """One step, returns its measures; a frame is stored at the start, every `frame_strain`, and at the end of each leg."""
+        if self.steps == 0 and not self.prestressed:
+            self.assembly.release_links()
         target = self.path[self.leg + 1]
         heading = 1.0 if target > self.path[self.leg] else -1.0
         ramp = self.step / (3.0 * self.time_scale)

@@ -1,0 +1,170 @@
+"""The main job: from a study file to a report. Runs are tasks on the local cores; a study that was stopped goes on where it was."""
+
+from __future__ import annotations
+
+import platform
+import time
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import msgspec
+
+from .. import __version__
+from ..dem.bodies import Assembly
+from ..dem.record import TriaxialRecord
+from ..dem.storage import load_run, replace_file
+
+from .bars import Bars
+from .identification import Identification, identify_law
+from .options import Specimen
+from .report import write_report
+from .runs_info import RunsInfo, SampleView, quality_rows, series_of
+from .study import Study, demo_study, read_study
+from .tasks import Prepare, Probe, Test, probes_of
+
+__all__ = ["run_study"]
+
+Task = Prepare | Test | Probe
+
+
+def run_study(study_file: Path | str | None, directory: Path | str, *, jobs: int = 2, show: bool = True) -> Identification:
+    """Make the samples, test them, identify the law, write `report.html`, `report.json`, `law.py` and `runs/*.h5` into `directory`.
+
+    `study_file` None takes the study that fenchel carries. Raises `InputError` for a bad study, `ConvergenceError` when a step or a fit
+    does not converge, `StorageError` when a file cannot be written; finished runs stay and are taken up by the next call.
+    """
+    directory = Path(directory)
+    if study_file is None:
+        study, text = demo_study()
+    else:
+        study = read_study(study_file)
+        text = Path(study_file).read_bytes()
+    folder = directory / "runs"
+    replace_file(directory / "study.toml", text)
+    clock = {"start": time.perf_counter()}
+    _warm_up(study)
+    clock["compilation"] = time.perf_counter()
+    seeds = study.solve.seeds
+    prepare = [Prepare(study, seed, folder) for seed in seeds]
+    has_wires = study.wires is not None and study.wires.count > 0
+    kinds = [True, False] if study.wires is not None and study.wires.control and has_wires else [True]
+    tests = [Test(study, seed, p, linked, folder) for seed in seeds for p in study.pressures for linked in kinds]
+    probes = probes_of(study, folder) if study.solve.stiffness_probe else []
+    folder.mkdir(parents=True, exist_ok=True)
+    with Bars([*prepare, *tests, *probes], folder, show=show) as bars:
+        _run(prepare, jobs, bars)
+        clock["preparation"] = time.perf_counter()
+        results = _run([*tests, *probes], jobs, bars)
+        clock["tests"] = time.perf_counter()
+    records: list[TriaxialRecord] = results[: len(tests)]
+    identification = identify_law(_specimens(tests, records), study.options())
+    clock["identification"] = time.perf_counter()
+    info = _runs_info(study, prepare[0], tests, records, results[len(tests) :], clock)
+    write_report(identification, info, directory)
+    return identification
+
+
+def _warm_up(study: Study) -> None:
+    """Compile the kernels once here, so that the worker processes find them on the disk."""
+    import numpy as np
+
+    from ..dem.stepping import Drive, Material, Simulation, Solver
+    from ..dem.triaxial import TriaxialTest
+
+    x = np.array([[0.0, 0.0, -0.5e-3], [0.0, 0.0, 0.5e-3]])
+    pair = Assembly.of_spheres(x, np.full(2, 0.5e-3), np.full(2, 1e-5), np.full(3, 1e-3), wire=np.zeros(2, dtype=np.int64), rank=np.arange(2))
+    for friction in (0.0, 0.4):
+        Simulation(pair.copy(), Material(friction=friction, bead_friction=friction), Solver(keep_unconverged=True)).advance(1e-5, Drive())
+    test = TriaxialTest(pair, Material(), Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3))
+    test.advance()
+
+
+def _run(tasks: Sequence[Task], jobs: int, bars: Bars) -> list[Any]:
+    """Run tasks on `jobs` processes, in order of cost, and return their results in the order given."""
+    from joblib import Parallel, delayed
+
+    order = sorted(range(len(tasks)), key=lambda k: -tasks[k].cost)
+    out: list[Any] = [None] * len(tasks)
+    calls = (delayed(_call)(k, tasks[k]) for k in order)
+    for k, result in Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="all")(calls):
+        out[k] = result
+        bars.finished(tasks[k])
+    return out
+
+
+def _call(index: int, task: Callable[[], Any]) -> tuple[int, Any]:
+    return index, task()
+
+
+def _specimens(tests: Sequence[Test], records: Sequence[TriaxialRecord]) -> list[Specimen]:
+    out = []
+    for seed in dict.fromkeys(t.seed for t in tests):
+        mine = [(t, r) for t, r in zip(tests, records, strict=True) if t.seed == seed]
+        out.append(
+            Specimen(
+                seed=seed,
+                linked={t.pressure: r for t, r in mine if t.linked},
+                control={t.pressure: r for t, r in mine if not t.linked},
+            )
+        )
+    return out
+
+
+def _runs_info(
+    study: Study,
+    prepared: Prepare,
+    tests: Sequence[Test],
+    records: Sequence[TriaxialRecord],
+    probes: Sequence[dict[str, Any]],
+    clock: dict[str, float],
+) -> RunsInfo:
+    import cvxpy
+    import numba
+    import numpy
+    import scipy
+    import sympy
+
+    content, _ = load_run(prepared.state_file(study.pressures[0]))
+    assembly = Assembly.from_arrays(content["assembly"])
+    stamps = list(clock.items())
+    whole: dict[str, Any] = msgspec.to_builtins(study)
+    flat = {
+        f"{table}.{key}": value
+        for table, keys in whole.items()
+        for key, value in (keys.items() if isinstance(keys, dict) else {"": keys}.items())
+    }
+    return RunsInfo(
+        settings=flat,
+        seconds={name: now - before for (_, before), (name, now) in zip(stamps, stamps[1:], strict=False)},
+        versions={
+            "fenchel": __version__, "python": platform.python_version(), "numpy": numpy.__version__, "scipy": scipy.__version__,
+            "numba": numba.__version__, "sympy": sympy.__version__, "cvxpy": cvxpy.__version__,
+        },
+        sample=SampleView(
+            positions=assembly.x,
+            radii=assembly.radius,
+            wire=assembly.wire,
+            title=f"seed {prepared.seed} at {study.pressures[0] / 1e3:g} kPa",
+        ),
+        series=series_of(records),
+        quality=quality_rows(records),
+        stiffness=probes,
+        stiffness_note=_stiffness_note(probes),
+        files=[str(t.run_file.relative_to(t.folder.parent)) for t in tests],
+    )  # fmt: skip
+
+
+def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
+    """One sentence on what the probes show."""
+    key = "E_s at 0.02 % [MPa]"
+    own = [row[key] for row in probes if row["grains"] == "compliant"]
+    rigid = [row[key] for row in probes if row["grains"] == "rigid"]
+    parts = []
+    if own:
+        parts.append(f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % at half the tolerance and half the step.")
+    if rigid:
+        parts.append(
+            f"With rigid grains the same sample shows {min(rigid):.3g} to {max(rigid):.3g} MPa: that stiffness is an artefact of sweeps and step, not of the sample."
+        )
+    return " ".join(parts)

@@ -1,0 +1,285 @@
+"""The runs of a study as independent tasks: one per seed that prepares, one per test, one per stiffness probe.
+
+A task is a plain value that can be pickled to another process; its run file is its result and its checkpoint, so that a study that was
+stopped goes on where it was. Progress goes to a small file beside the run files, which whoever waits may read.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import msgspec
+import numpy as np
+
+from ..dem.bodies import Assembly
+from ..dem.preparation import IsotropicStage, make_sample, material_of, preparation, pressure_change
+from ..dem.record import TriaxialRecord
+from ..dem.run import Progress, Stage, finished_test, record_of, run_stages
+from ..dem.stepping import Drive, Material, Simulation, Solver
+from ..dem.storage import load_run
+from ..dem.triaxial import TriaxialTest, inertial_time
+from ..errors import InputError
+from .study import Study
+
+__all__ = ["Prepare", "Probe", "Test", "probes_of", "progress_file", "read_progress"]
+
+
+def _report(place: Path, progress: Progress) -> None:
+    """Leave the present progress in a file, whole or not at all."""
+    part = place.with_suffix(".part")
+    part.write_bytes(msgspec.json.encode(progress))
+    os.replace(part, place)
+
+
+def read_progress(place: Path) -> Progress | None:
+    """The progress left by a task, if any."""
+    try:
+        return msgspec.json.decode(place.read_bytes(), type=Progress)
+    except (OSError, msgspec.DecodeError):
+        return None
+
+
+def _settings(study: Study, **more: Any) -> dict[str, Any]:
+    """What a run depends on: not the other seeds, pressures or the identification."""
+    whole = msgspec.to_builtins(study)
+    kept = {key: whole[key] for key in ("grains", "wires", "sample")}
+    kept["solve"] = {key: whole["solve"][key] for key in ("tolerance", "sweep_limit", "step")}
+    return kept | more
+
+
+@dataclass(frozen=True)
+class Prepare:
+    """Sample of one seed at rest at every pressure, one state file each."""
+
+    study: Study
+    seed: int
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """Of the task, and of its progress file."""
+        return f"seed {self.seed}: preparation"
+
+    @property
+    def cost(self) -> float:
+        """Rough share of the whole work."""
+        return 2.0 + 0.3 * (len(self.study.pressures) - 1)
+
+    def state_file(self, pressure: float) -> Path:
+        """Where the state at a pressure is."""
+        return self.folder / f"seed{self.seed}_{pressure / 1e3:g}kPa_state.h5"
+
+    def __call__(self) -> None:
+        """Walk through the pressures in rising order; each starts from the state before."""
+        study = self.study
+        levels = study.pressures
+        for k, pressure in enumerate(levels):
+            makers: list[Callable[[Assembly], Stage]]
+            if k == 0:
+                stages = (study.grains, study.wires, study.sample, study.solve, pressure)
+                count = len(preparation(_dot(), *stages))
+                makers = [partial(_prepared, stages=stages, index=i) for i in range(count)]
+                begin = partial(make_sample, study.grains, study.wires, study.sample, self.seed)
+            else:
+                before = levels[k - 1]
+                makers = [
+                    partial(
+                        pressure_change, grains=study.grains, wires=study.wires, solve=study.solve, before=before, pressure=pressure
+                    )
+                ]
+                begin = partial(_load_state, self.state_file(before))
+            run_stages(
+                makers,
+                begin,
+                self.state_file(pressure),
+                _settings(study, seed=self.seed, pressures=levels[: k + 1]) | {"kind": "state"},
+                _state_content,
+                progress=lambda p, k=k: _report(
+                    progress_file(self.folder, self.name), replace(p, fraction=(k + p.fraction) / len(levels))
+                ),
+            )
+
+
+def _dot() -> Assembly:
+    return Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1), np.ones(3))
+
+
+def _prepared(assembly: Assembly, stages: tuple[Any, ...], index: int) -> IsotropicStage:
+    return preparation(assembly, *stages)[index]
+
+
+def _state_content(assembly: Assembly, stage: Stage) -> dict[str, Any]:
+    return {"assembly": assembly.arrays()}
+
+
+def _load_state(path: Path) -> Assembly:
+    content, _ = load_run(path)
+    if "stage" in content:
+        raise InputError(f"{path}: the preparation is not finished; run the study again")
+    return Assembly.from_arrays(content["assembly"])
+
+
+def progress_file(folder: Path, name: str) -> Path:
+    """Where a task of that name leaves its progress."""
+    return folder / f".progress-{name.replace(' ', '_').replace(':', '')}"
+
+
+@dataclass(frozen=True)
+class Test:
+    """One triaxial test of one sample at one pressure, with or without links."""
+
+    study: Study
+    seed: int
+    pressure: float
+    linked: bool
+    folder: Path
+
+    @property
+    def name(self) -> str:
+        """Of the task, and of its progress file."""
+        return f"seed {self.seed}: {self.pressure / 1e3:g} kPa, {'links on' if self.linked else 'control'}"
+
+    @property
+    def cost(self) -> float:
+        """Rough share of the whole work."""
+        return 1.2 if self.linked else 1.0
+
+    @property
+    def run_file(self) -> Path:
+        """Where the record is."""
+        kind = "linked" if self.linked else "unlinked"
+        return self.folder / f"seed{self.seed}_{self.pressure / 1e3:g}kPa_{kind}.h5"
+
+    def __call__(self) -> TriaxialRecord:
+        """Run or go on with the test; returns its record."""
+        study, t = self.study, self.study.triaxial
+        law = material_of(study.grains, study.wires)
+        settings = _settings(study, seed=self.seed, pressure=self.pressure, linked=self.linked) | {
+            "pressures": [p for p in study.pressures if p <= self.pressure],
+            "triaxial": {
+                "strain_path": list(t.strain_path),
+                "inertial_number": t.inertial_number,
+                "sphere": t.sphere,
+                "frame_strain": t.frame_strain,
+            },
+        }
+
+        def test(assembly: Assembly) -> Stage:
+            return TriaxialTest(
+                assembly,
+                replace(law, links=law.links and self.linked),
+                Solver(tolerance=study.solve.tolerance, sweep_limit=study.solve.sweep_limit),
+                pressure=self.pressure,
+                density=study.grains.density,
+                strain_path=t.strain_path,
+                inertial_number=t.inertial_number,
+                step_fraction=study.solve.step,
+                sphere=t.sphere,
+                frame_strain=t.frame_strain,
+                prestressed=study.wires is not None and study.wires.state == "prestressed",
+            )
+
+        content = run_stages(
+            [test],
+            partial(_load_state, Prepare(study, self.seed, self.folder).state_file(self.pressure)),
+            self.run_file,
+            settings,
+            partial(finished_test, seed=self.seed),
+            progress=partial(_report, progress_file(self.folder, self.name)),
+        )
+        return record_of(content, settings)
+
+
+@dataclass(frozen=True)
+class Probe:
+    """The first 0.05 % of a test under another tolerance, step or grain stiffness: what does E_s owe to the solver?"""
+
+    study: Study
+    seed: int
+    folder: Path
+    rigid: bool = False
+    step: float = 1.0  # over that of the study
+    tolerance: float | None = None  # stop there; None: stop at `sweeps`, converged or not
+    sweeps: int = 100_000
+
+    @property
+    def name(self) -> str:
+        """Of the task, and of its progress file."""
+        stop = f"tolerance {self.tolerance:g}" if self.tolerance else f"{self.sweeps} sweeps"
+        return f"stiffness: {'rigid' if self.rigid else 'compliant'} grains, {stop}, step x {self.step:g}"
+
+    @property
+    def cost(self) -> float:
+        """Rough share of the whole work."""
+        return 0.3
+
+    def __call__(self) -> dict[str, Any]:
+        """A row of the table: settings, secant moduli at 0.02 and 0.05 %, residuals reached."""
+        study, t = self.study, self.study.triaxial
+        pressure = study.pressures[0]
+        assembly = _load_state(Prepare(study, self.seed, self.folder).state_file(pressure))
+        law: Material = material_of(study.grains, study.wires)
+        if self.rigid:
+            law = replace(law, normal_stiffness=np.inf, tangential_stiffness=np.inf)
+        solver = Solver(tolerance=self.tolerance or 1e-13, sweep_limit=self.sweeps, keep_unconverged=self.tolerance is None)
+        step = study.solve.step * self.step
+        if self.rigid:
+            # the deflections of the compliant state stay as overlaps; forces settle anew
+            drive = Drive(pressure=np.full(3, pressure))
+            rest = Simulation(assembly, replace(law, links=False), solver)
+            for _ in range(round(2.0 / step)):
+                rest.advance(step * inertial_time(assembly, pressure, study.grains.density), drive)
+        test = TriaxialTest(
+            assembly,
+            law,
+            solver,
+            pressure=pressure,
+            density=study.grains.density,
+            strain_path=(0.0, -5.2e-4),
+            inertial_number=t.inertial_number,
+            step_fraction=step,
+            sphere=t.sphere,
+            frame_strain=2.5e-5,
+            prestressed=study.wires is not None and study.wires.state == "prestressed",
+        )
+        while not test.done:
+            test.advance()
+        record = test.record(seed=self.seed, settings={})
+        q = record.wall_stress[:, 2] - 0.5 * (record.wall_stress[:, 0] + record.wall_stress[:, 1])
+        strain = -record.axial_strain
+
+        def secant(level: float) -> float:
+            return float(-(np.interp(level, strain, q) - q[0]) / level / 1e6)
+
+        return {
+            "grains": "rigid" if self.rigid else "compliant",
+            "tolerance": self.tolerance,
+            "sweeps a step": record.quality["sweeps_mean"],
+            "inertial time / step": record.quality["inertial_time_over_step"],
+            "E_s at 0.02 % [MPa]": secant(2e-4),
+            "E_s at 0.05 % [MPa]": secant(5e-4),
+            "natural map": record.quality["natural_map_median"],
+            "relative impulse change": float(np.median(record.series["change"])),
+            "unbalanced force": record.quality["unbalanced_median"],
+        }
+
+
+def probes_of(study: Study, folder: Path) -> list[Probe]:
+    """The probes of a study: its own grains at half the tolerance and half the step, then the same grains made rigid."""
+    make = partial(Probe, study, study.solve.seeds[0], folder)
+    tolerance = study.solve.tolerance
+    own = []
+    if study.grains.normal_stiffness is not None:
+        own = [
+            make(tolerance=tolerance),
+            make(tolerance=tolerance / 2),
+            make(tolerance=tolerance, step=0.5),
+            make(tolerance=tolerance / 2, step=0.5),
+        ]
+    rigid = [make(rigid=True, sweeps=n) for n in (5, 20, 100, 500)]
+    return [*own, *rigid, make(rigid=True, sweeps=20, step=0.5)]
