@@ -13,6 +13,8 @@ from .options import IdentifyOptions, Specimen
 from .parameters import LawParameters
 from .prediction import Prediction, predict
 from .replay import Replay, Simulate, replay
+from .report import write_report
+from .runs_info import RunsInfo, SampleView, Series, quality_rows, series_of
 from .yielding import (
     LineFit,
     YieldFit,
@@ -36,6 +38,9 @@ __all__ = [
     "Mismatch",
     "Prediction",
     "Replay",
+    "RunsInfo",
+    "SampleView",
+    "Series",
     "Simulate",
     "Specimen",
     "Stage",
@@ -53,6 +58,9 @@ __all__ = [
     "least_squares_line",
     "phase_mismatch",
     "predict",
+    "quality_rows",
     "replay",
     "sensitivity",
+    "series_of",
+    "write_report",
 ]

@@ -43,7 +43,9 @@ class Bars:
             self._thread.start()
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, value: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self._stop.set()
         if self._thread is not None:
             self._thread.join()
@@ -94,7 +96,11 @@ class Bars:
         def view() -> Table:
             share, busy = self._state()
             table = Table.grid(padding=(0, 1))
-            table.add_row("whole study", ProgressBar(total=1.0, completed=share, width=30), f"{100 * share:.0f} %, {self._left(share)} left")
+            table.add_row(
+                "whole study",
+                ProgressBar(total=1.0, completed=share, width=30),
+                f"{100 * share:.0f} %, {self._left(share)} left",
+            )
             for name, fraction, said in busy:
                 table.add_row(name, ProgressBar(total=1.0, completed=fraction, width=30), said)
             return table

@@ -16,6 +16,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -112,7 +113,8 @@ def _minimise(function, low: float, high: float) -> tuple[float, bool]:
     grid = np.linspace(low, high, 50)
     best = int(np.argmin([function(float(x)) for x in grid]))
     a, b = grid[max(best - 1, 0)], grid[min(best + 1, len(grid) - 1)]
-    found = float(minimize_scalar(function, bounds=(a, b), method="bounded", options={"xatol": 1e-9}).x)
+    result: Any = minimize_scalar(function, bounds=(a, b), method="bounded", options={"xatol": 1e-9})
+    found = float(result.x)
     at_end = min(found - low, high - found) < 1e-5
     if at_end:
         found = low if found - low < high - found else high

@@ -19,6 +19,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -158,7 +159,7 @@ def _solve(
     def fun(y: Array) -> Array:
         return problem.residual(unpack(y * scale))
 
-    def jac(y: Array) -> Array:
+    def slope(y: Array) -> Array:
         centre = fun(y)
         columns = []
         for k in range(len(y)):
@@ -168,6 +169,7 @@ def _solve(
             columns.append((fun(shifted) - centre) / h)
         return np.stack(columns, axis=1)
 
+    jac: Any = slope
     found = least_squares(
         fun, begin, jac=jac, bounds=(low, high), method="dogbox", ftol=1e-10, xtol=1e-8, gtol=1e-12, max_nfev=60
     )

@@ -28,7 +28,9 @@ __all__ = ["run_study"]
 Task = Prepare | Test | Probe
 
 
-def run_study(study_file: Path | str | None, directory: Path | str, *, jobs: int = 2, show: bool = True) -> Identification:
+def run_study(
+    study_file: Path | str | None, directory: Path | str, *, jobs: int = 2, show: bool = True
+) -> Identification:
     """Make the samples, test them, identify the law, write `report.html`, `report.json`, `law.py` and `runs/*.h5` into `directory`.
 
     `study_file` None takes the study that fenchel carries. Raises `InputError` for a bad study, `ConvergenceError` when a step or a fit
@@ -73,10 +75,16 @@ def _warm_up(study: Study) -> None:
     from ..dem.triaxial import TriaxialTest
 
     x = np.array([[0.0, 0.0, -0.5e-3], [0.0, 0.0, 0.5e-3]])
-    pair = Assembly.of_spheres(x, np.full(2, 0.5e-3), np.full(2, 1e-5), np.full(3, 1e-3), wire=np.zeros(2, dtype=np.int64), rank=np.arange(2))
+    pair = Assembly.of_spheres(
+        x, np.full(2, 0.5e-3), np.full(2, 1e-5), np.full(3, 1e-3), wire=np.zeros(2, dtype=np.int64), rank=np.arange(2)
+    )
     for friction in (0.0, 0.4):
-        Simulation(pair.copy(), Material(friction=friction, bead_friction=friction), Solver(keep_unconverged=True)).advance(1e-5, Drive())
-    test = TriaxialTest(pair, Material(), Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3))
+        Simulation(
+            pair.copy(), Material(friction=friction, bead_friction=friction), Solver(keep_unconverged=True)
+        ).advance(1e-5, Drive())
+    test = TriaxialTest(
+        pair, Material(), Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3)
+    )
     test.advance()
 
 
@@ -162,7 +170,9 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
     rigid = [row[key] for row in probes if row["grains"] == "rigid"]
     parts = []
     if own:
-        parts.append(f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % at half the tolerance and half the step.")
+        parts.append(
+            f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % at half the tolerance and half the step."
+        )
     if rigid:
         parts.append(
             f"With rigid grains the same sample shows {min(rigid):.3g} to {max(rigid):.3g} MPa: that stiffness is an artefact of sweeps and step, not of the sample."

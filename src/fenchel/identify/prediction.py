@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .curves import Curves, deviator, lateral
+from .curves import Curves, deviator, lateral, pressure
 from .elastic import unit_wire
 from .parameters import LawParameters
 from .replay import Simulate
@@ -39,6 +39,8 @@ class Prediction:
     axial_strain: Array
     q: Array
     q_law: Array
+    q_sand: Array  # of the sand, whole [Pa]
+    mean_sand: Array  # mean pressure P_s of the sand [Pa]
     lateral_strain: Array
     lateral_strain_law: Array
     volume_strain: Array
@@ -78,6 +80,8 @@ def predict(
         axial_strain=test.axial_strain,
         q=test.q,
         q_law=q_law,
+        q_sand=deviator(test.sand),
+        mean_sand=pressure(test.sand),
         lateral_strain=side,
         lateral_strain_law=side_law,
         volume_strain=volume,

@@ -67,25 +67,20 @@ def replay(parameters: LawParameters, pressure: float, axial_strain: Array) -> R
     """
     from fenchel.integrators import drive_arrays
 
-    update = _update()
     targets = np.zeros((len(axial_strain), 6))
     targets[:, :2] = -pressure
     targets[:, 2] = axial_strain
     control = np.array([True, True, False, True, True, True])
-    history = drive_arrays(
-        update, control, targets, _values(parameters), initial_state=_start(update, parameters, pressure)
-    )
+    plastic = np.zeros((1, 6))
+    plastic[0, :3] = pressure / (3.0 * parameters.bulk)
+    start = {"eps_p": plastic, "alpha": np.zeros((1, 6)), "p": np.zeros(1)}
+    history = drive_arrays(_update(), control, targets, _values(parameters), initial_state=start)
     failed = np.flatnonzero(np.asarray(history.status) != int(Status.CONVERGED))
     if len(failed):
         raise ConvergenceError(
-            f"the law did not converge at step {failed[0]} (axial strain {axial_strain[failed[0]]:.3e}, {pressure:g} Pa, "
-            f"{parameters}): take smaller strain steps"
+            f"the law did not converge at step {failed[0]} (axial strain {axial_strain[failed[0]]:.3e}, {pressure:g} Pa): "
+            "take smaller strain steps"
         )
     strain = np.asarray(history.eps)
     wire = parameters.E_w * unit_wire(strain, parameters.nu)
     return Replay(strain=strain, stress=np.asarray(history.sig), wire=wire)
-
-
-def _start(update: Any, parameters: LawParameters, pressure: float) -> Any:
-    """State of one point at the start of the test."""
-    raise NotImplementedError

@@ -89,7 +89,12 @@ class Prepare:
                 before = levels[k - 1]
                 makers = [
                     partial(
-                        pressure_change, grains=study.grains, wires=study.wires, solve=study.solve, before=before, pressure=pressure
+                        pressure_change,
+                        grains=study.grains,
+                        wires=study.wires,
+                        solve=study.solve,
+                        before=before,
+                        pressure=pressure,
                     )
                 ]
                 begin = partial(_load_state, self.state_file(before))
@@ -226,7 +231,9 @@ class Probe:
         law: Material = material_of(study.grains, study.wires)
         if self.rigid:
             law = replace(law, normal_stiffness=np.inf, tangential_stiffness=np.inf)
-        solver = Solver(tolerance=self.tolerance or 1e-13, sweep_limit=self.sweeps, keep_unconverged=self.tolerance is None)
+        solver = Solver(
+            tolerance=self.tolerance or 1e-13, sweep_limit=self.sweeps, keep_unconverged=self.tolerance is None
+        )
         step = study.solve.step * self.step
         if self.rigid:
             # the deflections of the compliant state stay as overlaps; forces settle anew

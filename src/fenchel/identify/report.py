@@ -1,0 +1,175 @@
+"""The report: one HTML file with everything in it, the same numbers as JSON, and the law as files.
+
+The findings come first, the least flattering at the head; then the law and its intervals; then the figures in the order in
+which a mechanician looks at them; then the quality of the runs. Nothing is fetched from anywhere.
+"""
+
+from __future__ import annotations
+
+import json
+from base64 import b64encode
+from collections.abc import Callable
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from ..errors import StorageError
+from .figure_style import Signs, picture
+from .identification import Identification
+from .jsonable import jsonable
+from .law_file import write_law
+from .report_tables import Table, tables
+from .runs_info import RunsInfo
+
+__all__ = ["figures", "write_report"]
+
+
+@dataclass(frozen=True)
+class _Figure:
+    key: str
+    caption: str
+    draw: Callable[[], Any]
+    kind: str = "svg"
+
+
+def figures(found: Identification, info: RunsInfo, signs: Signs) -> list[_Figure]:
+    """The figures of the report in order, drawn when asked; those without data are left out."""
+    from .figure_numbers import energy_figure, residual_figure, yield_figure
+    from .figure_sample import sample_figure
+    from .figure_tests import fit_figure, mismatch_figure, phase_figure, strain_figure, stress_figure, wire_figure
+
+    out = []
+    if info.sample is not None:
+        view = info.sample
+        out.append(_Figure("sample", "The sample.", lambda: sample_figure(view), "png"))
+    out += [
+        _Figure(
+            "stress",
+            "Stress–strain curves, with wires and with the same beads unlinked.",
+            lambda: stress_figure(found, signs),
+        ),
+        _Figure("fit", "The law (black) over the tests; the error is rms / max|q|.", lambda: fit_figure(found, signs)),
+        _Figure("volume", "Volume strain: not fitted. The law is associated.", lambda: strain_figure(found, signs)),
+        _Figure("phases", "Stress of the phases.", lambda: phase_figure(found, signs)),
+        _Figure(
+            "wires",
+            "Wire stress against strain, with the identified unilateral law.",
+            lambda: wire_figure(found, signs),
+        ),
+        _Figure("mismatch", "Do the phases share one strain?", lambda: mismatch_figure(found, signs)),
+        _Figure(
+            "yield",
+            "Yield: first legs in the plane of the sand's own mean pressure. The equivalent stress is √J₂ = q/√3, not q.",
+            lambda: yield_figure(found),
+        ),
+    ]
+    if any(set(s.values) & {"natural_map", "change", "unbalanced"} for s in info.series):
+        out.append(
+            _Figure(
+                "residuals", "Residuals of the contact solver along the tests.", lambda: residual_figure(info.series)
+            )
+        )
+    for s in info.series:
+        if "external" in s.values:
+            out.append(_Figure("energy", "Energy balance of one test.", lambda s=s: energy_figure(s)))
+            break
+    return out
+
+
+_CSS = """
+:root{color-scheme:light}
+body{margin:0 auto;max-width:46rem;padding:1rem;font:16px/1.5 Georgia,"Times New Roman",serif;color:#222;background:#fff}
+h1{font-size:1.5rem;line-height:1.2;margin:.5rem 0}h2{font-size:1.1rem;margin:2rem 0 .5rem}
+ul.findings{padding-left:1.1rem}ul.findings li{margin:.3rem 0}ul.findings li.first{font-weight:bold}
+figure{margin:1.2rem 0}figure img{width:100%;height:auto}figcaption,caption{font-size:.9rem;color:#555;text-align:left}
+.scroll{overflow-x:auto;margin:1rem 0}
+table{border-collapse:collapse;font:13px/1.4 system-ui,sans-serif;font-variant-numeric:tabular-nums}
+th,td{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #eee}
+th{font-weight:600;color:#555}td:not(:first-child){white-space:nowrap}
+summary{cursor:pointer;font-size:.9rem;color:#555}footer{margin:2rem 0;font-size:.85rem;color:#777}
+code{font-size:.85em}
+"""
+
+
+def _table(table: Table) -> str:
+    head = "".join(f"<th>{escape(h)}</th>" for h in table.head)
+    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
+    caption = "" if table.folded else f"<caption>{escape(table.caption)}</caption>"
+    inside = f"{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
+    html = f'<div class="scroll"><table id="{table.key}">{inside}</table></div>'
+    return f"<details><summary>{escape(table.caption)}</summary>{html}</details>" if table.folded else html
+
+
+def _image(figure: _Figure) -> str:
+    data = b64encode(picture(figure.draw(), figure.kind)).decode()
+    mime = "image/svg+xml" if figure.kind == "svg" else "image/png"
+    return (
+        f'<figure id="figure-{figure.key}"><img alt="{escape(figure.caption)}" src="data:{mime};base64,{data}">'
+        f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
+    )
+
+
+def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
+    drawn = {f.key: _image(f) for f in figures(found, info, signs)}
+    table = {key: _table(t) for key, t in tables(found, info).items()}
+
+    def put(*keys: str) -> str:
+        return "".join(drawn.get(key, "") + table.get(key, "") for key in keys)
+
+    sentences = "".join(
+        f"<li{' class=first' if k == 0 else ''}>{escape(text)}</li>" for k, text in enumerate(found.findings)
+    )
+    notes = "".join(f"<p>{escape(text)}</p>" for text in info.notes)
+    stiffness = f"<p>{escape(info.stiffness_note)}</p>" if info.stiffness_note and info.stiffness else ""
+    first = f"{found.fitted[0] / 1e3:g}kPa"
+    files = "".join(f"<li><code>{escape(name)}</code></li>" for name in info.files)
+    parts = [
+        f"<h1>{escape(info.title)}</h1>",
+        f'<ul class="findings">{sentences}</ul>{notes}',
+        "<h2>The law</h2>",
+        put("values", "stages"),
+        f"<p>Run it: <code>fenchel drive law.py:law path_{first}.csv --parameters parameters_{first}.toml</code></p>",
+        "<h2>Tests and replay</h2>",
+        f"<p>Axes: {escape(signs.name)}; q is positive when the sample is pressed along z.</p>",
+        put("sample", "stress", "fit", "predictions", "volume"),
+        "<h2>Phases and wires</h2>",
+        put("phases", "wires", "mismatch", "control", "control_values"),
+        "<h2>Elasticity and yield</h2>",
+        put("elastic", "yield", "readings", "by_pressure"),
+        "<h2>Quality of the runs</h2>" if info.quality or info.series or info.stiffness else "",
+        put("quality", "quality_runs", "residuals", "energy", "stiffness"),
+        stiffness,
+        "<h2>Settings</h2>" if info.settings or info.seconds or info.versions else "",
+        put("settings", "seconds", "versions"),
+        f"<h2>Run files</h2><ul>{files}</ul>" if files else "",
+        f"<footer>Identification {found.seconds:.1f} s; the same numbers in <code>report.json</code>.</footer>",
+    ]
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width,initial-scale=1">'
+        f"<title>{escape(info.title)}</title><style>{_CSS}</style></head><body>{''.join(parts)}</body></html>\n"
+    )
+
+
+def write_report(
+    found: Identification, runs_info: RunsInfo, directory: Path | str, *, signs: str = "tension-positive"
+) -> Path:
+    """Write `report.html`, `report.json`, `law.py`, and a path and a parameter file per pressure; returns the path of the HTML.
+
+    `signs`: "tension-positive" or "compression-positive", for the axes. Raises `StorageError` when a file cannot be written.
+    """
+    folder = Path(directory)
+    page = _page(found, runs_info, Signs(signs))
+    # the pictures' data (positions, series) stay in the run files
+    info = {key: jsonable(value) for key, value in vars(runs_info).items() if key not in ("sample", "series")}
+    numbers = {"identification": found.to_json(), "runs": info}
+    text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / "report.json").write_text(text, encoding="utf-8")
+        write_law(found, folder)
+        (folder / "report.html").write_text(page, encoding="utf-8")
+    except OSError as reason:
+        raise StorageError(f"{folder}: the report cannot be written: {reason.strerror or reason}") from None
+    return folder / "report.html"
