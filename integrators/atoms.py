@@ -76,7 +76,12 @@ class _Frame:
         for term in Add.make_args(expand(expression)):
             moving = [a for a in Mul.make_args(term) if isinstance(a, TraceLeaf) or a in self.places]
             rest = Mul(*(a for a in Mul.make_args(term) if a not in moving))
-            if invariants_of(rest) or len(moving) > 1 or rest.atoms(PositivePart) or rest.free_symbols & set(self.places):
+            if (
+                invariants_of(rest)
+                or len(moving) > 1
+                or rest.atoms(PositivePart)
+                or rest.free_symbols & set(self.places)
+            ):
                 raise DeclarationError(f"{rule}: {term} is not affine in traces and scalars; it has no conic form here")
             if not moving:
                 shift += self.number(rest)
@@ -119,14 +124,18 @@ def energy_atoms(law: Law, values: Mapping[str, float]) -> ConvexAtoms:
             matrix, shift6 = frame.tensor(factors[0].args[0])
             scale = float(matrix[0, 0])
             if matrix[:, 6:].any() or not np.allclose(matrix[:, :6], scale * np.eye(6), atol=0.0):
-                raise DeclarationError(f"{rule}: {factors[0]} must be taken of the observable (times a number, plus a spherical tensor)")
+                raise DeclarationError(
+                    f"{rule}: {factors[0]} must be taken of the observable (times a number, plus a spherical tensor)"
+                )
             spectral.append((weight, scale, shift6))
         elif kind == [InnerLeaf]:
             (m1, s1), (m2, s2) = (frame.tensor(a) for a in factors[0].args)
             hessian += weight * (m1.T @ m2 + m2.T @ m1)
             linear += weight * (m1.T @ s2 + m2.T @ s1)
             constant += weight * float(s1 @ s2)
-        elif len(factors) <= 2 and not any(issubclass(k, (PositivePart, NormLeaf, InnerLeaf, PositiveSquareLeaf)) for k in kind):
+        elif len(factors) <= 2 and not any(
+            issubclass(k, (PositivePart, NormLeaf, InnerLeaf, PositiveSquareLeaf)) for k in kind
+        ):
             rows = [frame.affine(g, rule) for g in factors]
             if len(rows) == 2:
                 (r1, t1), (r2, t2) = rows
@@ -174,5 +183,3 @@ def flow_atoms(law: Law, values: Mapping[str, float]) -> FlowAtoms:
         norms.append(tuple(cones))
         limits.append(-shift0)
     return FlowAtoms(tuple(linear), tuple(norms), tuple(limits))
-
-

@@ -4,8 +4,8 @@ For increments Δ and forces Y at the end of the step, both admissible, primal m
 
     gap = φ(Δ) + φ*(Y) − Y·Δ ≥ 0,
 
-as the state laws hold exactly by construction. Where the computed pair is not exactly admissible, the residual is bounded by what it takes to
-make it so: f(Y)₊ γ for the forces, and the excess of the flow over its cone for the increments.
+as the state laws hold exactly by construction. Where the computed pair is not exactly admissible, the residual is
+bounded by what it takes to make it so: f(Y)₊ γ for the forces, and the excess of the flow over its cone for the increments.
 """
 
 from __future__ import annotations
@@ -48,7 +48,9 @@ def _multiplier(delta: Array, row: Array, norms: Any) -> tuple[Array, Array]:
     missed = np.linalg.norm(delta - found @ basis.T, axis=1)
     gamma = found[:, 0]
     if norms:
-        shear = np.linalg.norm(found[:, 1:] @ (np.eye(6) - np.outer(np.r_[1, 1, 1, 0, 0, 0], np.r_[1, 1, 1, 0, 0, 0]) / 3.0), axis=1)
+        shear = np.linalg.norm(
+            found[:, 1:] @ (np.eye(6) - np.outer(np.r_[1, 1, 1, 0, 0, 0], np.r_[1, 1, 1, 0, 0, 0]) / 3.0), axis=1
+        )
         if not row.any():
             gamma = shear / a
         missed = missed + np.maximum(shear - a * gamma, 0.0)

@@ -96,7 +96,7 @@ def stability_list(law: Law, moduli: Moduli) -> list[tuple[str, Expr]]:
         (law.observable.name, moduli.strain),
         *((x.name, row[k]) for k, (x, row) in enumerate(zip(internal_tensors(law), moduli.tensors, strict=True))),
     ]:
-        zero = {s: S.Zero for s in (*operator.c0.atoms(Step), *operator.c1.atoms(Step))}
+        zero = dict.fromkeys((*operator.c0.atoms(Step), *operator.c1.atoms(Step)), S.Zero)
         for expression in (operator.c0.xreplace(zero), operator.c0.xreplace(zero) + 3 * operator.c1.xreplace(zero)):
             if is_constant(expression):
                 found.append((name, expression))
@@ -329,7 +329,9 @@ def _tangent(law: Law, moduli: Moduli, cone: ConeStructure | None, writer: Write
     for weight, tensor in strain.spectral:
         number = writer.spectrum(tensor)
         writer.uses.add("add_positive_derivative")
-        writer.line(f"add_positive_derivative({writer.code(weight)}, eigen{number}_, work_[{4 * number + 5}], tangent_)")
+        writer.line(
+            f"add_positive_derivative({writer.code(weight)}, eigen{number}_, work_[{4 * number + 5}], tangent_)"
+        )
     for weight, left, right in strain.dyads:
         writer.tensor_into("work_[0]", left)
         writer.line("left_ = work_[0].copy()")

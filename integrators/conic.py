@@ -73,16 +73,24 @@ class ConicStep:
                 warnings.simplefilter("ignore", UserWarning)
                 self.problem.solve(solver=cvxpy.CLARABEL, **settings)
         except cvxpy.error.SolverError as error:
-            raise ConvergenceError(f"law '{self.law.name}': clarabel fails on the step: {str(error).splitlines()[0]}") from None
+            raise ConvergenceError(
+                f"law '{self.law.name}': clarabel fails on the step: {str(error).splitlines()[0]}"
+            ) from None
         if self.problem.status not in ("optimal", "optimal_inaccurate"):
             raise ConvergenceError(f"law '{self.law.name}': clarabel ends with status '{self.problem.status}'")
         sign = -1.0
         stress = sign * np.asarray(self.strain_constraint.dual_value).reshape(6) * self.energy_unit / self.strain_unit
-        change = np.zeros(0) if self.state_variable is None else np.asarray(self.state_variable.value).reshape(-1) * self.strain_unit
+        change = (
+            np.zeros(0)
+            if self.state_variable is None
+            else np.asarray(self.state_variable.value).reshape(-1) * self.strain_unit
+        )
         packed = self.old + change
         layout, _ = state_layout(self.law)
         state = {n: packed[s] if length == 1 else packed[s : s + 6] for n, (s, length) in layout.items()}
-        return ConicSolution(stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status)
+        return ConicSolution(
+            stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status
+        )
 
 
 def conic_step(law: Law, eps_new: Any, state: Mapping[str, Any] | None, values: Mapping[str, Any]) -> ConicStep:
@@ -110,12 +118,19 @@ def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old
     import cvxpy as cp
 
     size = old.size
-    stiffness = float(np.abs(np.diag(energy.hessian)).max(initial=0.0)) or max((w for w, *_ in energy.spectral), default=1.0) or 1.0
+    stiffness = (
+        float(np.abs(np.diag(energy.hessian)).max(initial=0.0))
+        or max((w for w, *_ in energy.spectral), default=1.0)
+        or 1.0
+    )
     limit = max((abs(k) for k in flow.limits), default=0.0)
     point = np.concatenate([eps, old])
     force = energy.hessian @ point + energy.linear
     # the unit of strain follows the size of the step; the yield strain bounds it from below
-    strain_unit = max(limit / stiffness, float(np.abs(force).max(initial=0.0)) / stiffness, float(np.abs(eps).max(initial=0.0))) or 1.0
+    strain_unit = (
+        max(limit / stiffness, float(np.abs(force).max(initial=0.0)) / stiffness, float(np.abs(eps).max(initial=0.0)))
+        or 1.0
+    )
     energy_unit = stiffness * strain_unit**2
     x_eps = cp.Variable(6)
     x_new = cp.Variable(size) if size else None
@@ -161,4 +176,3 @@ def _matrix(cp: Any, mandel: Any) -> Any:
     a, b, c = mandel[0], mandel[1], mandel[2]
     f, e, d = half * mandel[3], half * mandel[4], half * mandel[5]
     return cp.bmat([[a, d, e], [d, b, f], [e, f, c]])
-

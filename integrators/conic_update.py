@@ -45,7 +45,13 @@ class ConicUpdate:
         return self.packing.initial_state(point_count)
 
     def __call__(
-        self, eps_new: Any, state: Mapping[str, Any] | None = None, dt: float = 1.0, *, certify: bool = False, **values: Any
+        self,
+        eps_new: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        certify: bool = False,
+        **values: Any,
     ) -> StepResult:
         """See `Update.__call__`; `certify` is not available here."""
         if certify:
@@ -78,7 +84,9 @@ class ConicUpdate:
                 width = 1e-4 * max(float(np.abs(eps[row]).max()), self._yield_strain(energy.hessian, flow.limits))
                 for j in range(6):
                     h = width * np.eye(6)[j]
-                    tangent[row, :, j] = (solved(eps[row] + h, row).stress - solved(eps[row] - h, row).stress) / (2 * width)
+                    tangent[row, :, j] = (solved(eps[row] + h, row).stress - solved(eps[row] - h, row).stress) / (
+                        2 * width
+                    )
         return StepResult(stress, tangent, self.packing.unpack(new), dissipation, np.zeros(n, dtype=np.int64), None)
 
     @staticmethod

@@ -30,7 +30,9 @@ def drive(
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
     update = law if isinstance(law, Update) else build_update(law, solver=solver)
     if not isinstance(update, Update):
-        raise InputError(f"law '{update.law.name}' has no closed form; paths need one (its step is solved by '{update.solver}')")
+        raise InputError(
+            f"law '{update.law.name}' has no closed form; paths need one (its step is solved by '{update.solver}')"
+        )
     return drive_arrays(
         update,
         plan.control,

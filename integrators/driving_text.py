@@ -62,7 +62,7 @@ def solve_(matrix_, right_, size_, floor_):
 @njit(folder=FOLDER)
 def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out_state_, out_psi_, out_dissipation_,
            values_, tolerance_, limit_):
-    """Steps under mixed control: find y with v (sigma(base + z y)) = goal, by damped Newton; returns (failed row, residual, scale).
+    """Steps under mixed control: find y with v sigma(base + z y) = goal, by damped Newton; returns (failed row, residual, scale).
 
     The strain increment lies in the span of the columns of `z_`, the stress is tested by the rows of `v_`.
     """
@@ -71,7 +71,7 @@ def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out
     steps_, size_ = base_.shape[0], z_.shape[1]
     new_ = np.zeros(out_state_.shape[1])
     sig_, tangent_, elastic_ = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
-    trial_, half_ = np.zeros(6), np.zeros((6, 6))
+    trial_ = np.zeros(6)
     residual_, step_, matrix_ = np.zeros(6), np.zeros(6), np.zeros((6, 6))
     point_(eps_, old_, new_, sig_, elastic_, True, work_, c_)
     stiff_ = 0.0
@@ -102,12 +102,10 @@ def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out
         for turn_ in range(limit_):
             size_now_ = 0.0
             scale_ = 0.0
+            strain_ = 0.0
             for i_ in range(6):
                 scale_ = max(scale_, abs(sig_[i_]))
-                high_ = 0.0
-                for j_ in range(6):
-                    high_ = max(high_, abs(tangent_[i_, j_])*abs(eps_[j_]))
-                scale_ = max(scale_, high_)
+                strain_ = max(strain_, abs(eps_[i_]))
             for k_ in range(size_):
                 value_ = -goal_[n_, k_]
                 scale_ = max(scale_, abs(goal_[n_, k_]))
@@ -115,11 +113,13 @@ def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out
                     value_ += v_[k_, i_]*sig_[i_]
                 residual_[k_] = value_
                 size_now_ = max(size_now_, abs(value_))
-            highest_ = max(highest_, scale_)
             if status_ != 0:
                 break
-            if size_now_ <= tolerance_*max(scale_, 1e-6*highest_):
+            # rounding of stiffness times strain bounds what can be reached, but a runaway strain must not excuse a residual
+            level_ = max(scale_, 1e-3*highest_)
+            if size_now_ <= max(tolerance_*level_, min(4e-15*stiff_*strain_, 1e-8*level_)):
                 done_ = True
+                highest_ = max(highest_, scale_)
                 break
             for k_ in range(size_):
                 for l_ in range(size_):

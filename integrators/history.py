@@ -61,14 +61,18 @@ def drive_arrays(
     mask = np.asarray(control, dtype=bool)
     goals = np.array(targets, dtype=float, ndmin=2)
     if mask.shape != (6,) or goals.ndim != 2 or goals.shape[1] != 6:
-        raise InputError(f"drive: control has shape {mask.shape} and targets {goals.shape}; they must be (6,) and (n, 6)")
+        raise InputError(
+            f"drive: control has shape {mask.shape} and targets {goals.shape}; they must be (6,) and (n, 6)"
+        )
     free = np.zeros(6, dtype=bool)
     if trace is not None:
         if trace not in ("eps_v", "p"):
             raise InputError(f"drive: trace {trace!r} is not known; it is 'eps_v' or 'p'")
         free[:3] = np.isnan(goals[:, :3]).all(axis=0)
         if not free.any():
-            raise InputError(f"drive: '{trace}' replaces a normal component; leave one of xx, yy, zz without prescription (NaN)")
+            raise InputError(
+                f"drive: '{trace}' replaces a normal component; leave one of xx, yy, zz without prescription (NaN)"
+            )
         condition = np.asarray(trace_targets, dtype=float)
         if condition.shape != (goals.shape[0],) or not np.isfinite(condition).all():
             raise InputError("drive: trace_targets must hold one finite value per row")
@@ -76,7 +80,9 @@ def drive_arrays(
     else:
         condition = np.zeros(goals.shape[0])
     if not np.isfinite(goals).all():
-        raise InputError(f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})")
+        raise InputError(
+            f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})"
+        )
     plan = _plan(mask, free, goals, trace, condition)
     packed = packed_values(update, values)
     return _run(update, plan, packed, initial_strain, initial_state, tolerance)
@@ -124,7 +130,12 @@ def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace:
 
 
 def _run(
-    update: Update, plan: _Plan, values: Array, initial_strain: Any, initial_state: Mapping[str, Any] | None, tolerance: float
+    update: Update,
+    plan: _Plan,
+    values: Array,
+    initial_strain: Any,
+    initial_state: Mapping[str, Any] | None,
+    tolerance: float,
 ) -> History:
     n = len(plan.base)
     eps, sig = np.zeros((n, 6)), np.zeros((n, 6))
@@ -133,7 +144,21 @@ def _run(
     start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
     old = update.pack(initial_state, 1)[0]
     failed, residual, scale = update.module.drive_(
-        plan.base, plan.goal, plan.z, plan.v, plan.symmetric, start, old, eps, sig, state, psi, dissipation, values, tolerance, TURNS
+        plan.base,
+        plan.goal,
+        plan.z,
+        plan.v,
+        plan.symmetric,
+        start,
+        old,
+        eps,
+        sig,
+        state,
+        psi,
+        dissipation,
+        values,
+        tolerance,
+        TURNS,
     )
     if failed >= 0:
         raise ConvergenceError(

@@ -17,7 +17,13 @@ __all__ = ["rooms_hash"]
 def rooms_hash() -> str:
     """Hash of the sources of `potentials` and `integrators`, of Python, sympy, numba and the processor."""
     root = Path(__file__).parent.parent
-    parts: list[str | bytes] = [sys.version, platform.machine(), version("sympy"), version("numba"), version("llvmlite")]
+    parts: list[str | bytes] = [
+        sys.version,
+        platform.machine(),
+        version("sympy"),
+        version("numba"),
+        version("llvmlite"),
+    ]
     for room in ("potentials", "integrators"):
         for file in sorted((root / room).rglob("*.py")):
             if "library" not in file.parts:

@@ -54,4 +54,6 @@ def _write(path: Path, text: str) -> None:
             file.write(text)
         os.replace(temporary, path)
     except OSError as error:
-        raise StorageError(f"cannot write generated code to {path.parent}: {error.strerror}; set FENCHEL_CACHE to another folder") from error
+        raise StorageError(
+            f"cannot write generated code to {path.parent}: {error.strerror}; set FENCHEL_CACHE to another folder"
+        ) from error

@@ -46,7 +46,9 @@ def read_path(file: str | Path) -> StrainStressPath:
         raise InputError(f"path file '{path}' cannot be read: {reason}") from None
     rows = [(i, row) for i, row in enumerate(rows, start=1) if any(cell.strip() for cell in row)]
     if not rows:
-        raise InputError(f"path file '{path}' is empty; it needs a header such as 't,eps_zz,sig_xx,sig_yy' and rows of numbers")
+        raise InputError(
+            f"path file '{path}' is empty; it needs a header such as 't,eps_zz,sig_xx,sig_yy' and rows of numbers"
+        )
     header = [cell.strip() for cell in rows[0][1]]
     _check_header(path, header)
     if len(rows) < 2:
@@ -55,11 +57,15 @@ def read_path(file: str | Path) -> StrainStressPath:
     first = rows[1][0]
     for name, value in zip(header, table[0], strict=True):
         if name not in ("t", "T") and value != 0.0:
-            raise InputError(f"path file '{path}', row {first}, column '{name}': the first row is the virgin state and must be zero, not {value:g}")
+            raise InputError(
+                f"path file '{path}', row {first}, column '{name}': the first row is the virgin state and must be zero, not {value:g}"
+            )
     time = table[:, header.index("t")]
     late = np.flatnonzero(np.diff(time) <= 0)
     if late.size:
-        raise InputError(f"path file '{path}', row {rows[2 + late[0]][0]}, column 't': the time must increase, it is {time[late[0] + 1]:g}")
+        raise InputError(
+            f"path file '{path}', row {rows[2 + late[0]][0]}, column 't': the time must increase, it is {time[late[0] + 1]:g}"
+        )
     return _path(header, table, time)
 
 
@@ -81,7 +87,9 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise InputError(f"{where}: both 'eps_v' and 'p' are given; one of them may replace one component")
     for name in ("eps_v", "p"):
         if name in header and all(f"eps_{c}" in header or f"sig_{c}" in header for c in COMPONENTS[:3]):
-            raise InputError(f"{where}: '{name}' replaces a normal component; leave out the column of one of xx, yy, zz")
+            raise InputError(
+                f"{where}: '{name}' replaces a normal component; leave out the column of one of xx, yy, zz"
+            )
 
 
 def _numbers(path: Path, number: int, header: list[str], row: list[str]) -> list[float]:
@@ -92,7 +100,9 @@ def _numbers(path: Path, number: int, header: list[str], row: list[str]) -> list
         try:
             value = float(cell)
         except ValueError:
-            raise InputError(f"path file '{path}', row {number}, column '{name}': {cell.strip()!r} is not a number") from None
+            raise InputError(
+                f"path file '{path}', row {number}, column '{name}': {cell.strip()!r} is not a number"
+            ) from None
         if not math.isfinite(value):
             raise InputError(f"path file '{path}', row {number}, column '{name}': {cell.strip()} is not finite")
         found.append(value)
@@ -136,7 +146,11 @@ def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]
         columns |= {f"{kind}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
     mean = history.sig[:, :3].sum(axis=1) / 3.0
     deviator = history.sig - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    columns |= {"eps_v": history.eps[:, :3].sum(axis=1), "p": -mean, "q": np.sqrt(1.5) * np.linalg.norm(deviator, axis=1)}
+    columns |= {
+        "eps_v": history.eps[:, :3].sum(axis=1),
+        "p": -mean,
+        "q": np.sqrt(1.5) * np.linalg.norm(deviator, axis=1),
+    }
     ends = {"psi": history.psi, "dissipation": history.dissipation, "status": history.status}
     for name, values in history.state.items():
         if values.ndim == 2:

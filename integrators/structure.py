@@ -29,7 +29,15 @@ from ..potentials.invariants import NormLeaf, TraceLeaf
 from ..potentials.scalars import ScalarVariable
 from ..potentials.tensor import Deviator, SymmetricTensor, TensorSymbol
 
-__all__ = ["ConeStructure", "Moduli", "NoConeStructure", "find_cone", "find_moduli", "internal_scalars", "internal_tensors"]
+__all__ = [
+    "ConeStructure",
+    "Moduli",
+    "NoConeStructure",
+    "find_cone",
+    "find_moduli",
+    "internal_scalars",
+    "internal_tensors",
+]
 
 
 class NoConeStructure(DeclarationError):
@@ -81,7 +89,9 @@ def find_moduli(law: Law) -> Moduli:
         *((f"{x}–{y}", o) for x, row in zip(tensors, blocks, strict=True) for y, o in zip(tensors, row, strict=True)),
     ]:
         if not operator.is_isotropic_constant:
-            raise NoConeStructure(f"law '{law.name}': the block {name} of the second derivative of psi is not constant and isotropic")
+            raise NoConeStructure(
+                f"law '{law.name}': the block {name} of the second derivative of psi is not constant and isotropic"
+            )
     slopes = [gradient(law.psi, s) for s in scalars]
     rows = tuple(tuple(slope.diff(s) for s in scalars) for slope in slopes)  # type: ignore[union-attr]
     for s, slope, row in zip(scalars, slopes, rows, strict=True):
@@ -113,10 +123,14 @@ def find_cone(law: Law, moduli: Moduli) -> ConeStructure:
             trace_weights = [old + slope * w for old, w in zip(trace_weights, weights, strict=True)]
         elif isinstance(leaf, NormLeaf):
             if a != 0:
-                raise NoConeStructure(f"law '{law.name}': phi_star holds two different norms; the closed form takes one")
+                raise NoConeStructure(
+                    f"law '{law.name}': phi_star holds two different norms; the closed form takes one"
+                )
             dev_weights, a = weights, slope
         else:
-            raise NoConeStructure(f"law '{law.name}': phi_star holds {leaf}; the closed form takes norm(dev(...)) and tr(...)")
+            raise NoConeStructure(
+                f"law '{law.name}': phi_star holds {leaf}; the closed form takes norm(dev(...)) and tr(...)"
+            )
     scalar_weights = []
     for s in scalars:
         slope = opened.diff(law.forces[s]) if s in law.forces else S.Zero
@@ -126,13 +140,17 @@ def find_cone(law: Law, moduli: Moduli) -> ConeStructure:
     return _weights(moduli, a, dev_weights, trace_weights, scalar_weights)
 
 
-def _force_weights(law: Law, tensor: SymmetricTensor, tensors: tuple[TensorSymbol, ...], deviatoric: bool) -> list[Expr]:
+def _force_weights(
+    law: Law, tensor: SymmetricTensor, tensors: tuple[TensorSymbol, ...], deviatoric: bool
+) -> list[Expr]:
     weights = [S.Zero] * len(tensors)
     place = {law.forces[x]: k for k, x in enumerate(tensors) if x in law.forces}
     for atom, coefficient in tensor.terms().items():
         base = atom.args[0] if isinstance(atom, Deviator) else atom
         if base not in place or (deviatoric and not isinstance(atom, Deviator)):
-            raise NoConeStructure(f"law '{law.name}': phi_star holds {tensor} inside a norm or trace; write norm(dev(...)) of forces")
+            raise NoConeStructure(
+                f"law '{law.name}': phi_star holds {tensor} inside a norm or trace; write norm(dev(...)) of forces"
+            )
         weights[place[base]] += coefficient  # type: ignore[index]
     return weights
 

@@ -71,7 +71,9 @@ class Update:
             return packed
         for name in state:
             if name not in self.layout:
-                raise InputError(f"law '{self.law.name}' has no internal variable '{name}'; it has: {', '.join(self.layout) or 'none'}")
+                raise InputError(
+                    f"law '{self.law.name}' has no internal variable '{name}'; it has: {', '.join(self.layout) or 'none'}"
+                )
         for name, (start, length) in self.layout.items():
             if name not in state:
                 raise InputError(f"law '{self.law.name}': the state lacks the internal variable '{name}'")
@@ -81,14 +83,22 @@ class Update:
                 try:
                     value = np.broadcast_to(value, shape)
                 except ValueError:
-                    raise InputError(f"state '{name}' has shape {value.shape}; for {point_count} points it must be {shape}") from None
+                    raise InputError(
+                        f"state '{name}' has shape {value.shape}; for {point_count} points it must be {shape}"
+                    ) from None
             if not np.isfinite(value).all():
                 raise InputError(f"state '{name}' holds a value that is not finite")
             packed[:, start : start + length] = value.reshape(point_count, length)
         return packed
 
     def __call__(
-        self, eps_new: Any, state: Mapping[str, Any] | None = None, dt: float = 1.0, *, certify: bool = False, **values: Any
+        self,
+        eps_new: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        certify: bool = False,
+        **values: Any,
     ) -> StepResult:
         """Step to the strains `eps_new` [-], Mandel components, shape (n, 6) or (6,).
 
@@ -155,7 +165,9 @@ def check_moduli(law: Law, moduli: Any, values: Array) -> None:
         involved = names.split()
         shown = ", ".join(f"{n} = {table[n]:g}" for n in involved)
         if not np.isfinite(value):
-            raise InputError(f"law '{law.name}': {shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2")
+            raise InputError(
+                f"law '{law.name}': {shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2"
+            )
         negative = [n for n in involved if table[n] < 0] or involved
         if variable != law.observable.name:
             raise InputError(
@@ -171,10 +183,16 @@ def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
     if failed.size == 0:
         return
     first = ", ".join(str(int(i)) for i in failed[:5])
-    reason = {Status.NOT_FINITE: "overflow", Status.INFEASIBLE: "no plastically admissible stress", Status.ITERATION_LIMIT: "iteration limit"}
+    reason = {
+        Status.NOT_FINITE: "overflow",
+        Status.INFEASIBLE: "no plastically admissible stress",
+        Status.ITERATION_LIMIT: "iteration limit",
+    }
     word = reason.get(Status(int(status[failed[0]])), "failure")
     strain = np.array2string(eps[failed[0]], precision=6, max_line_width=1000)
-    raise ConvergenceError(f"the step fails at {failed.size} of {status.size} points ({word}), first {first}; strain of the first: {strain}")
+    raise ConvergenceError(
+        f"the step fails at {failed.size} of {status.size} points ({word}), first {first}; strain of the first: {strain}"
+    )
 
 
 def build_update(

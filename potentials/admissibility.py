@@ -105,13 +105,19 @@ def _flow(law: Law, conditions: list[tuple[str, Expr]], reasons: list[str]) -> l
         opened = function.xreplace(dict(zip(generators, dummies, strict=True)))
         for dummy, generator in zip(dummies, generators, strict=True):
             slope = opened.diff(dummy)
-            if slope.atoms(Dummy) or not is_constant(slope) or not isinstance(generator, (NormLeaf, TraceLeaf, ForceScalar)):
+            if (
+                slope.atoms(Dummy)
+                or not is_constant(slope)
+                or not isinstance(generator, (NormLeaf, TraceLeaf, ForceScalar))
+            ):
                 open_ends.append(f"phi_star: no rule for {generator} in inequality {j}")
             elif isinstance(generator, NormLeaf):
                 _condition(conditions, slope)
-        at_zero = -opened.xreplace({d: 0 for d in dummies})
+        at_zero = -opened.xreplace(dict.fromkeys(dummies, 0))
         conditions.append((f"{factor(at_zero)} >= 0", at_zero))
-        reasons.append(f"phi_star: inequality {j} is a sum of norms and linear terms, convex; f(0) <= 0 puts zero in the domain")
+        reasons.append(
+            f"phi_star: inequality {j} is a sum of norms and linear terms, convex; f(0) <= 0 puts zero in the domain"
+        )
     if not law.surfaces:
         reasons.append("phi_star: none, the law is elastic")
     return open_ends

@@ -60,7 +60,9 @@ def partial_conjugate(law: Law) -> StressPotential:
         elif tensor.terms().get(eps) == 1 and mu != 0:
             shifted.append((eps - tensor, lam, mu))
         else:
-            raise DeclarationError(f"{rule}: the quadratic term in {tensor} is neither of eps - x nor of internal variables alone")
+            raise DeclarationError(
+                f"{rule}: the quadratic term in {tensor} is neither of eps - x nor of internal variables alone"
+            )
     for weight, variable in terms.scalars:
         internal += weight * variable**2
     if len(shifted) > 1:
@@ -88,12 +90,16 @@ def _unilateral(
     if not positive and not spectral:
         return None
     if len(spectral) != 1 or len(positive) > 1 or spectral[0][1] != eps or (positive and positive[0][1] != tr(eps)):
-        raise DeclarationError(f"{rule}: the conjugate of a unilateral energy is known for λ/2 pos(tr(eps))**2 + μ inner(pos(eps), pos(eps))")
+        raise DeclarationError(
+            f"{rule}: the conjugate of a unilateral energy is known for λ/2 pos(tr(eps))**2 + μ inner(pos(eps), pos(eps))"
+        )
     return (2 * positive[0][0] if positive else S.Zero), spectral[0][0]
 
 
 def _hooke_phase(stress: TensorSymbol, lam: Expr, mu: Expr, shift: SymmetricTensor | None) -> Phase:
-    energy = factor(1 / (4 * mu)) * inner(stress, stress) - factor(lam / (4 * mu * (2 * mu + 3 * lam))) * tr(stress) ** 2
+    energy = (
+        factor(1 / (4 * mu)) * inner(stress, stress) - factor(lam / (4 * mu * (2 * mu + 3 * lam))) * tr(stress) ** 2
+    )
     if shift is not None:
         energy = energy + inner(stress, shift)
     return Phase(stress, energy, sstr(energy), latex(energy), shift)

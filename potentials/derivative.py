@@ -38,7 +38,9 @@ class Operator:
         return not self.dyads and not self.spectral and is_constant(self.c0) and is_constant(self.c1)
 
     def __add__(self, other: Operator) -> Operator:
-        return Operator(self.c0 + other.c0, self.c1 + other.c1, self.dyads + other.dyads, self.spectral + other.spectral)
+        return Operator(
+            self.c0 + other.c0, self.c1 + other.c1, self.dyads + other.dyads, self.spectral + other.spectral
+        )
 
 
 def invariants_of(expression: Expr) -> list[Invariant]:
@@ -108,7 +110,9 @@ def _leaf_second(leaf: Invariant, x: TensorSymbol, y: TensorSymbol, weight: Expr
         return Operator(weight * pair[0] / leaf, weight * pair[1] / leaf, ((-weight / leaf, left, right),))
     if isinstance(leaf, PositiveSquareLeaf):
         if px[1] != 0 or py[1] != 0:
-            raise DeclarationError(f"the second derivative of {leaf} by a deviator is not available; take pos of the tensor itself")
+            raise DeclarationError(
+                f"the second derivative of {leaf} by a deviator is not available; take pos of the tensor itself"
+            )
         return Operator(spectral=((2 * weight * px[0] * py[0], first),))
     raise DeclarationError(f"no second derivative is known for {leaf}")
 

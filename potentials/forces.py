@@ -62,6 +62,8 @@ def indicator(*functions: Any) -> Indicator:
         except Exception:
             value = None
         if not isinstance(value, Expr):
-            raise DeclarationError("indicator takes the left side of f <= 0, a scalar expression; write indicator(f), not indicator(f <= 0)")
+            raise DeclarationError(
+                "indicator takes the left side of f <= 0, a scalar expression; write indicator(f), not indicator(f <= 0)"
+            )
         found.append(value)
     return Indicator(tuple(found))

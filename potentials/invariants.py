@@ -105,7 +105,9 @@ def tr(tensor: SymmetricTensor) -> Expr:
     """Trace."""
     terms = _tensor(tensor, "tr").terms()
     if any(a.has(PositiveTensor) for a in terms):
-        raise DeclarationError("tr(pos(e)) is not differentiable and not available as an energy; use inner(pos(e), pos(e))")
+        raise DeclarationError(
+            "tr(pos(e)) is not differentiable and not available as an energy; use inner(pos(e), pos(e))"
+        )
     rest = from_terms({a: c for a, c in terms.items() if not isinstance(a, (IdentityTensor, Deviator))})
     constant = 3 * sum((c for a, c in terms.items() if isinstance(a, IdentityTensor)), S.Zero)
     return (TraceLeaf(rest) if rest.terms() else S.Zero) + constant

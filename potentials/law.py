@@ -52,9 +52,13 @@ class Law:
             raise DeclarationError(f"law '{self.name}': rank mismatch: psi is a tensor, an energy is a scalar")
         object.__setattr__(self, "psi", sympify(self.psi, strict=True))
         inner = self.internal
-        object.__setattr__(self, "internal", (inner,) if isinstance(inner, (TensorSymbol, ScalarVariable)) else tuple(inner))
+        object.__setattr__(
+            self, "internal", (inner,) if isinstance(inner, (TensorSymbol, ScalarVariable)) else tuple(inner)
+        )
         if self.phi_star is not None and not isinstance(self.phi_star, Indicator):
-            raise DeclarationError(f"law '{self.name}': phi_star must be indicator(f, ...) so far, not {type(self.phi_star).__name__}")
+            raise DeclarationError(
+                f"law '{self.name}': phi_star must be indicator(f, ...) so far, not {type(self.phi_star).__name__}"
+            )
         self._check_variables()
         self._check_expressions()
 
@@ -75,7 +79,9 @@ class Law:
         for function in self.surfaces:
             for force in sorted(function.atoms(ForceTensor, ForceScalar), key=default_sort_key):
                 if found.setdefault(force.variable, force) != force:
-                    raise DeclarationError(f"law '{self.name}': two names for the force of '{force.variable}'; call forces(...) once")
+                    raise DeclarationError(
+                        f"law '{self.name}': two names for the force of '{force.variable}'; call forces(...) once"
+                    )
         return found
 
     @property
@@ -122,7 +128,9 @@ class Law:
             try:
                 number = float(value)
             except (TypeError, ValueError):
-                raise InputError(f"law '{self.name}': parameter '{name}' must be a number, not {type(value).__name__}") from None
+                raise InputError(
+                    f"law '{self.name}': parameter '{name}' must be a number, not {type(value).__name__}"
+                ) from None
             if not math.isfinite(number):
                 raise InputError(f"law '{self.name}': parameter '{name}' is {number}; it must be finite")
             if not symbol.lower <= number <= symbol.upper:
@@ -188,8 +196,12 @@ class Law:
             raise DeclarationError(f"law '{self.name}': observable must be a tensor variable, sym_tensor('eps')")
         seen = {self.observable.name}
         for variable in self.internal:
-            if not isinstance(variable, (TensorSymbol, ScalarVariable)) or isinstance(variable, (ForceTensor, ForceScalar)):
-                raise DeclarationError(f"law '{self.name}': internal variable {variable} must be sym_tensor(...) or scalar(...)")
+            if not isinstance(variable, (TensorSymbol, ScalarVariable)) or isinstance(
+                variable, (ForceTensor, ForceScalar)
+            ):
+                raise DeclarationError(
+                    f"law '{self.name}': internal variable {variable} must be sym_tensor(...) or scalar(...)"
+                )
             if variable.name in seen:
                 raise DeclarationError(f"law '{self.name}': the variable '{variable.name}' is declared twice")
             seen.add(variable.name)
@@ -200,7 +212,9 @@ class Law:
         for what, expression in (("psi", self.psi), *(("phi_star", f) for f in self.surfaces)):
             for symbol in sorted(expression.free_symbols, key=str):
                 if type(symbol) is Symbol or not isinstance(symbol, (Parameter, ScalarVariable)):
-                    raise DeclarationError(f"{rule}: '{symbol}' in {what} is a bare symbol; declare it with parameter(...) or scalar(...)")
+                    raise DeclarationError(
+                        f"{rule}: '{symbol}' in {what} is a bare symbol; declare it with parameter(...) or scalar(...)"
+                    )
             for leaf in expression.atoms(Invariant):
                 _check_leaf(rule, what, leaf)
             symbols = [s for s in expression.atoms(TensorSymbol) if not isinstance(s, ForceTensor)]
@@ -208,19 +222,27 @@ class Law:
             owners = [s.variable for s in expression.atoms(ForceTensor, ForceScalar)]
             for symbol in sorted({*symbols, *owners}, key=str):
                 if symbol not in declared:
-                    raise DeclarationError(f"{rule}: '{symbol}' is used in {what} but not declared; add it to internal=(...)")
+                    raise DeclarationError(
+                        f"{rule}: '{symbol}' is used in {what} but not declared; add it to internal=(...)"
+                    )
             if what == "psi" and owners:
                 raise DeclarationError(f"{rule}: psi mentions a force; a free energy depends on state variables only")
             states = set(symbols) - set(owners)
             if what == "phi_star" and (states or expression.atoms(ScalarVariable) - expression.atoms(ForceScalar)):
                 shown = ", ".join(sorted(str(s) for s in states))
-                raise DeclarationError(f"{rule}: phi_star mentions the state {shown}; it may depend on forces only, see forces(...)")
+                raise DeclarationError(
+                    f"{rule}: phi_star mentions the state {shown}; it may depend on forces only, see forces(...)"
+                )
         if self.observable in self.forces:
-            raise DeclarationError(f"{rule}: phi_star mentions the force of '{self.observable}' (viscous stress); not modelled yet")
+            raise DeclarationError(
+                f"{rule}: phi_star mentions the force of '{self.observable}' (viscous stress); not modelled yet"
+            )
         names = [p.name for p in self.parameters]
         for name in names:
             if names.count(name) > 1:
-                raise DeclarationError(f"{rule}: two parameters are called '{name}' with different bounds or units; declare it once")
+                raise DeclarationError(
+                    f"{rule}: two parameters are called '{name}' with different bounds or units; declare it once"
+                )
             if name in {v.name for v in declared}:
                 raise DeclarationError(f"{rule}: '{name}' is both a parameter and a variable; rename one")
 

@@ -14,13 +14,18 @@ from ..errors import DeclarationError
 __all__ = ["RESERVED", "checked_name", "latex_name"]
 
 RESERVED = frozenset(
-    "abs bool certify complex control divmod dt e eps_new float float64 gap int len list math max min nan njit np numba numpy "
-    "pi pow print range round sorted stack state status str sum tuple type update values".split()
+    """
+    abs bool certify complex control divmod dt e eps_new float float64 gap int len list math max min nan
+    njit np numba numpy pi pow print range round sorted stack state status str sum tuple type update
+    values
+    """.split()  # noqa: SIM905
 )
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")
 _GREEK = frozenset(
-    "alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi psi omega "
-    "Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega".split()
+    """
+    alpha beta gamma delta zeta eta theta iota kappa lambda mu nu xi pi rho sigma tau upsilon phi chi
+    psi omega Gamma Delta Theta Lambda Xi Pi Sigma Upsilon Phi Psi Omega
+    """.split()  # noqa: SIM905
 )
 
 

@@ -11,7 +11,9 @@ from ..errors import DeclarationError
 
 __all__ = ["number_code"]
 
-_KNOWN = frozenset("exp log sin cos tan asin acos atan sinh cosh tanh sqrt Abs PositivePart Step".split())
+_KNOWN = frozenset(
+    ("exp log sin cos tan asin acos atan sinh cosh tanh sqrt Abs PositivePart Step").split()  # noqa: SIM905
+)
 
 
 class _NumberPrinter(PythonCodePrinter):

@@ -23,7 +23,9 @@ def load_law(where: str) -> Law:
         return LAWS[text]
     place, colon, name = text.rpartition(":")
     if not colon or not place or not name:
-        raise InputError(f"no law is called {text!r}; the library has: {', '.join(LAWS)}; a law file is given as file.py:name")
+        raise InputError(
+            f"no law is called {text!r}; the library has: {', '.join(LAWS)}; a law file is given as file.py:name"
+        )
     path = Path(place)
     if not path.is_file():
         raise InputError(f"law file {place!r} does not exist or is not a file")

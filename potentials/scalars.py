@@ -14,7 +14,17 @@ from sympy import Expr, Function, S, Symbol
 from ..errors import DeclarationError
 from .names import checked_name, latex_name
 
-__all__ = ["ForceScalar", "Parameter", "PositivePart", "ScalarVariable", "Step", "parameter", "parameters", "scalar", "tidy"]
+__all__ = [
+    "ForceScalar",
+    "Parameter",
+    "PositivePart",
+    "ScalarVariable",
+    "Step",
+    "parameter",
+    "parameters",
+    "scalar",
+    "tidy",
+]
 
 
 class Parameter(Symbol):
@@ -28,7 +38,13 @@ class Parameter(Symbol):
     note: str
 
     def __new__(
-        cls, name: str, lower: float = -math.inf, upper: float = math.inf, unit: str = "", default: float | None = None, note: str = ""
+        cls,
+        name: str,
+        lower: float = -math.inf,
+        upper: float = math.inf,
+        unit: str = "",
+        default: float | None = None,
+        note: str = "",
     ) -> Parameter:
         obj = Symbol.__xnew__(cls, name, real=True)
         obj.lower, obj.upper, obj.unit, obj.default, obj.note = lower, upper, unit, default, note
@@ -134,7 +150,9 @@ def tidy(expression: Expr) -> Expr:
         return expression.func(*(tidy(a) for a in expression.args))
     if expression.is_Mul:
         parts = [tidy(a) for a in expression.args]
-        positive = {base.args[0] for part in parts for base in (part, part.as_base_exp()[0]) if isinstance(base, PositivePart)}
+        positive = {
+            base.args[0] for part in parts for base in (part, part.as_base_exp()[0]) if isinstance(base, PositivePart)
+        }
         return expression.func(*(a for a in parts if not (isinstance(a, Step) and a.args[0] in positive)))
     return expression
 

@@ -55,7 +55,9 @@ class Table:
     def json(self) -> str:
         """JSON with the same rows."""
         rows = [{"title": r.title, "text": r.text, "latex": r.tex} for r in self.rows]
-        return json.dumps({"law": self.law, "formulation": self.formulation, "split": self.split, "rows": rows}, indent=2)
+        return json.dumps(
+            {"law": self.law, "formulation": self.formulation, "split": self.split, "rows": rows}, indent=2
+        )
 
 
 def build_table(law: Law, formulation: str, split: str) -> Table:
@@ -83,7 +85,9 @@ def _irreversible(law: Law) -> TensorSymbol | None:
     if not law.internal:
         return None
     if len(found) != 1:
-        raise DeclarationError(f"law '{law.name}': the reversible split needs psi to hold {eps} - x for one internal tensor x, found {len(found)}")
+        raise DeclarationError(
+            f"law '{law.name}': the reversible split needs psi to hold {eps} - x for one internal tensor x, found {len(found)}"
+        )
     (one,) = found
     return one  # type: ignore[return-value]
 
@@ -115,7 +119,9 @@ def _opening(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
     tex = latex_name(eps)
     products = [_product(_force_name(law, v, irreversible), v) for v in law.internal]
     if irreversible is None:
-        split = Row("decomposition", "sig = sig_r + sig_ir, sig_ir = 0", r"\sigma = \sigma^{r} + \sigma^{ir},\ \sigma^{ir} = 0")
+        split = Row(
+            "decomposition", "sig = sig_r + sig_ir, sig_ir = 0", r"\sigma = \sigma^{r} + \sigma^{ir},\ \sigma^{ir} = 0"
+        )
     else:
         x = _name(irreversible)
         split = Row("decomposition", f"{eps} = {eps}_r + {x[0]}", rf"{tex} = {tex}^{{r}} + {x[1]}")
@@ -137,11 +143,25 @@ def _strain_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         psi, observable = _reversible_energy(law, irreversible)
         stress = ("sig", r"\sigma")
     rows = [_equation("free energy", ("psi", r"\psi"), psi)]
-    rows.append(_equation("state law", stress, gradient(psi, observable), f"dpsi/d{observable}", rf"\partial_{{{latex(observable)}}}\psi"))
+    rows.append(
+        _equation(
+            "state law",
+            stress,
+            gradient(psi, observable),
+            f"dpsi/d{observable}",
+            rf"\partial_{{{latex(observable)}}}\psi",
+        )
+    )
     for v in law.internal:
         symbol = _name(v)
         rows.append(
-            _equation("state law", _force_name(law, v, irreversible), -gradient(psi, v), f"-dpsi/d{symbol[0]}", rf"-\partial_{{{symbol[1]}}}\psi")
+            _equation(
+                "state law",
+                _force_name(law, v, irreversible),
+                -gradient(psi, v),
+                f"-dpsi/d{symbol[0]}",
+                rf"-\partial_{{{symbol[1]}}}\psi",
+            )
         )
     return rows
 
@@ -164,8 +184,15 @@ def _stress_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
     if len(found.phases) > 1:
         names = [_name(phase.stress) for phase in found.phases]
         total = (" + ".join(n for n, _ in names), " + ".join(n for _, n in names))
-        inside = (f"min over {total[0]} = sig of {{{inside[0]}}}", rf"\min_{{{total[1]} = \sigma}}\left\{{{inside[1]}\right\}}")
-    minus = ("", "") if found.internal == 0 else (f" - ({sstr(found.internal)})", rf" - \left({latex(found.internal)}\right)")
+        inside = (
+            f"min over {total[0]} = sig of {{{inside[0]}}}",
+            rf"\min_{{{total[1]} = \sigma}}\left\{{{inside[1]}\right\}}",
+        )
+    minus = (
+        ("", "")
+        if found.internal == 0
+        else (f" - ({sstr(found.internal)})", rf" - \left({latex(found.internal)}\right)")
+    )
     rows = [Row("conjugate energy", f"psi_star = {inside[0]}{minus[0]}", rf"\psi^{{*}} = {inside[1]}{minus[1]}")]
     rows += [
         Row("conjugate energy", f"{_phase_name(phase)[0]} = {phase.text}", f"{_phase_name(phase)[1]} = {phase.tex}")
@@ -191,7 +218,9 @@ def _stress_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
                 value = value + gradient(phase.energy, v)
             elif irreversible == v and phase.shift is None:
                 value = value - phase.stress
-        rows.append(_equation("state law", name, value, f"dpsi_star/d{symbol[0]}", rf"\partial_{{{symbol[1]}}}\psi^{{*}}"))
+        rows.append(
+            _equation("state law", name, value, f"dpsi_star/d{symbol[0]}", rf"\partial_{{{symbol[1]}}}\psi^{{*}}")
+        )
     return rows
 
 
@@ -241,7 +270,11 @@ def _complementary(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
             if slope != 0:
                 parts.append(f"gamma{mark}*({sstr(slope)})")
                 texs.append(rf"\gamma{_sub(mark)}\left({latex(slope)}\right)")
-        rows.append(Row("complementary law", f"{rate[0]} = {' + '.join(parts) or '0'}", f"{rate[1]} = {' + '.join(texs) or '0'}"))
+        rows.append(
+            Row(
+                "complementary law", f"{rate[0]} = {' + '.join(parts) or '0'}", f"{rate[1]} = {' + '.join(texs) or '0'}"
+            )
+        )
     if shown_surfaces:
         rows.append(Row("multiplier", "gamma >= 0, f <= 0, gamma*f = 0", r"\gamma \geq 0,\ f \leq 0,\ \gamma f = 0"))
         rates = [_name(v, dot=True) for v in law.internal if v in law.forces]

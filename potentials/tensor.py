@@ -37,7 +37,9 @@ __all__ = [
 def scalar_operand(value: object, action: str) -> Expr:
     """Turn a number or sympy scalar into an `Expr`; strings are refused (they would be evaluated)."""
     if isinstance(value, SymmetricTensor):
-        raise DeclarationError(f"rank mismatch: {action} two tensors is not defined; use inner(a, b) for the scalar product")
+        raise DeclarationError(
+            f"rank mismatch: {action} two tensors is not defined; use inner(a, b) for the scalar product"
+        )
     try:
         number = sympify(value, strict=True)
     except Exception:
@@ -108,7 +110,9 @@ def _tensor_operand(value: object, action: str) -> SymmetricTensor:
         return value
     if isinstance(value, (int, Integer)) and value == 0:
         return TensorSum()
-    raise DeclarationError(f"rank mismatch: {action} a tensor and a scalar; write scalar * identity for a spherical tensor")
+    raise DeclarationError(
+        f"rank mismatch: {action} a tensor and a scalar; write scalar * identity for a spherical tensor"
+    )
 
 
 class TensorSymbol(SymmetricTensor):
@@ -167,7 +171,9 @@ class PositiveTensor(SymmetricTensor):
         if isinstance(tensor, PositiveTensor) or not tensor.terms():
             return tensor
         if tensor.has(PositiveTensor):
-            raise DeclarationError("pos of a tensor that already contains pos(...) is not available; declare the two energies apart")
+            raise DeclarationError(
+                "pos of a tensor that already contains pos(...) is not available; declare the two energies apart"
+            )
         return Basic.__new__(cls, tensor)
 
 
@@ -243,7 +249,9 @@ def _printed(tensor: SymmetricTensor, printer: Any, latex: bool) -> str:
         text = _term("", next(iter(devs.values())), inside, printer, latex)
     else:
         text = ""
-    for atom, c in sorted(terms.items(), key=lambda pair: (isinstance(pair[0], IdentityTensor), default_sort_key(pair[0]))):
+    for atom, c in sorted(
+        terms.items(), key=lambda pair: (isinstance(pair[0], IdentityTensor), default_sort_key(pair[0]))
+    ):
         text = _term(text, c, printer._print(atom), printer, latex)
     return text
 

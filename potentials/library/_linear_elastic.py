@@ -6,4 +6,6 @@ from ..law import Law
 from ..stiffness import isotropic
 from ._symbols import E, eps, nu
 
-linear_elastic = Law("linear_elastic", psi=isotropic(E, nu).energy(eps), observable=eps, note="isotropic linear elasticity")
+linear_elastic = Law(
+    "linear_elastic", psi=isotropic(E, nu).energy(eps), observable=eps, note="isotropic linear elasticity"
+)
