@@ -108,7 +108,7 @@ def _solve() -> str:
     x = cvxpy.Variable(2)
     problem = cvxpy.Problem(cvxpy.Minimize(cvxpy.norm(x - [2.0, 0.0])), [x[0] <= 1.0])
     problem.solve(solver="CLARABEL")
-    if problem.status != "optimal" or abs(x.value[0] - 1.0) > 1e-6:
+    if x.value is None or problem.status != "optimal" or abs(x.value[0] - 1.0) > 1e-6:
         raise ArithmeticError("a cone program gave a wrong answer")
     return "solves"
 

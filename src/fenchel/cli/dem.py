@@ -15,15 +15,33 @@ def register(app: typer.Typer) -> None:
 
 
 def _dem(
-    scene: Path = typer.Argument(..., metavar="SCENE.toml", help="The scene: grains, wires, walls, loading."),
+    scene: Path = typer.Argument(..., metavar="SCENE.toml", help="The scene: grains, wires, sample, test, solver."),
     output: Path = typer.Option(..., "-o", "--output", metavar="RUN.h5", help="The run file to write."),
-    resume: bool = typer.Option(False, "--resume", help="Go on from the checkpoint beside RUN.h5."),
+    resume: bool = typer.Option(False, "--resume", help="Go on with RUN.h5 from its last checkpoint, bit for bit."),
+    quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
+    json_wanted: bool = typer.Option(False, "--json", help="Print the quality of the run as JSON."),
 ) -> None:
-    """Run a scene of grains and wires, and write its run file.
+    """Make a sample of grains and wires, test it, and write its run file; the last table says how well it was solved.
 
     Example: fenchel dem scene.toml -o run.h5
     """
     from fenchel.dem import run_scene
 
-    run_scene(scene, output, resume=resume)
-    typer.echo(f"The run is in {output}")
+    from .progress import progress_bar
+    from .tables import print_json, print_table
+
+    with progress_bar(not quiet) as progress:
+        record = run_scene(scene, output, resume=resume, progress=progress)
+    if json_wanted:
+        print_json(
+            {
+                "run": output,
+                "pressure": record.pressure,
+                "seed": record.seed,
+                "linked": record.linked,
+                "frames": len(record.leg),
+                "quality": record.quality,
+            }
+        )
+    else:
+        print_table(("quality", "value"), record.quality.items(), title=f"{output}: {len(record.leg)} frames")

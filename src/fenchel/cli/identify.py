@@ -20,11 +20,15 @@ def _identify(
         ..., "-o", "--output", metavar="DIR", help="The folder of the report, law and run files."
     ),
     demo: bool = typer.Option(False, "--demo", help="Take the study that fenchel carries."),
+    jobs: int = typer.Option(2, "--jobs", min=1, help="How many runs go on at the same time."),
+    quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the numbers of the report as JSON."),
 ) -> None:
     """Make a sample of grains and wires, test it, identify a continuum law and say how well it holds.
 
     Writes DIR/report.html, DIR/report.json, DIR/law.py (for `fenchel drive`) and DIR/runs/*.h5.
+
+    Finished runs stay: the same command takes them up after an interruption.
 
     Example: fenchel identify study.toml -o result
     """
@@ -34,7 +38,7 @@ def _identify(
         raise InputError("identify takes either a study file or --demo: fenchel identify STUDY.toml -o DIR")
     from fenchel.identify.job import run_study
 
-    run_study(study, output)
+    run_study(study, output, jobs=jobs, show=not quiet)
     if json_wanted:
         typer.echo((output / "report.json").read_text(encoding="utf-8"))
     else:

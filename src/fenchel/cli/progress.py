@@ -1,0 +1,62 @@
+"""The bar of one run: stage, step, strain, residual, kinetic energy, time left. It goes to standard error."""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from fenchel.dem import Progress
+
+__all__ = ["progress_bar"]
+
+_PACE_OF_LINES = 15.0  # s between two lines where there is no terminal
+
+
+@contextmanager
+def progress_bar(wanted: bool = True) -> Iterator[Callable[[Progress], None] | None]:
+    """A function that shows a `Progress`: a bar on a terminal, a line now and then elsewhere; None if not wanted."""
+    if not wanted:
+        yield None
+    elif sys.stderr.isatty():
+        with _bar() as show:
+            yield show
+    else:
+        yield _lines()
+
+
+@contextmanager
+def _bar() -> Iterator[Callable[[Progress], None]]:
+    from rich.console import Console
+    from rich.progress import BarColumn, TaskProgressColumn, TextColumn, TimeRemainingColumn
+    from rich.progress import Progress as Bar
+
+    columns = (TextColumn("{task.description}"), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Bar(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        yield lambda progress: bar.update(task, completed=progress.fraction, description=_told(progress))
+
+
+def _lines() -> Callable[[Progress], None]:
+    start = shown = time.monotonic()
+
+    def show(progress: Progress) -> None:
+        nonlocal shown
+        now = time.monotonic()
+        if now - shown < _PACE_OF_LINES:
+            return
+        shown = now
+        left = (now - start) * (1.0 / progress.fraction - 1.0) if progress.fraction > 0.0 else float("nan")
+        print(f"{progress.fraction:5.1%}  {_told(progress)}  {left:.0f} s left", file=sys.stderr, flush=True)
+
+    return show
+
+
+def _told(progress: Progress) -> str:
+    return (
+        f"{progress.stage}  step {progress.step}  strain {progress.strain:+.3%}  "
+        f"residual {progress.residual:.1e}  kinetic {progress.kinetic:.1e} J"
+    )
