@@ -5,6 +5,7 @@ The run file is the checkpoint: it is replaced atomically while the run goes on 
 
 from __future__ import annotations
 
+import json
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
@@ -110,7 +111,7 @@ def run_stages(
     at, state = 0, {}
     if run_file.exists():
         content, before = load_run(run_file)
-        if before != settings:
+        if before != json.loads(json.dumps(settings)):
             raise InputError(f"{run_file}: was started with other settings; choose another place, or remove it")
         if "stage" not in content:
             return content
@@ -202,13 +203,28 @@ def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
 
 
 def record_content(record: TriaxialRecord) -> dict[str, Any]:
-    """A record as a nested dictionary for storage (settings are stored beside it)."""
-    return {f.name: getattr(record, f.name) for f in fields(record) if f.name != "settings"}
+    """A record as a nested dictionary for storage: plain tensor components (xx, yy, zz, yz, xz, xy), shear not doubled.
+
+    The homogenised histories stand beside the sums they follow from, for whoever opens the file with another program.
+    """
+    content = {f.name: getattr(record, f.name) for f in fields(record) if f.name != "settings"}
+    history = record.history()
+    names = ("strain_sand", "strain_wire", "stress_grains", "stress_beads", "stress_links")
+    return (
+        content
+        | {name: content[name] / _MANDEL for name in _SYMMETRIC}
+        | {"history": {name: getattr(history, name) / _MANDEL for name in names}}
+    )
+
+
+_SYMMETRIC = ("wall_strain", "wall_stress", "box_stress")
+_MANDEL = np.array([1.0, 1.0, 1.0, np.sqrt(2.0), np.sqrt(2.0), np.sqrt(2.0)])
 
 
 def record_of(content: dict[str, Any], settings: dict[str, Any]) -> TriaxialRecord:
     """The record in the content of a finished run."""
-    return TriaxialRecord(**content["record"], settings=settings)
+    stored = {key: value for key, value in content["record"].items() if key != "history"}
+    return TriaxialRecord(**stored | {name: stored[name] * _MANDEL for name in _SYMMETRIC}, settings=settings)
 
 
 def load_record(path: Path | str) -> TriaxialRecord:

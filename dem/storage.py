@@ -28,6 +28,7 @@ UNITS = {
     "spin": "m/s", "half": "m", "box_velocity": "m/s", "box_mass": "kg", "link_length": "m", "link_impulse": "N s",
     "pair_impulse": "N s", "wall_impulse": "N s", "listed_x": "m", "listed_half": "m", "step": "s", "elastic_energy": "J",
     "time": "s", "elastic": "J", "friction": "J", "algorithmic": "J", "shock": "J", "external": "J", "kinetic": "J", "balance": "J",
+    "strain_sand": "1", "strain_wire": "1", "stress_grains": "Pa", "stress_beads": "Pa", "stress_links": "Pa",
     "force_mean": "N", "overlap_mean": "m", "overlap_max": "m", "violation_max": "m",
 }  # fmt: skip
 
@@ -86,7 +87,7 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
         file.attrs["format"] = FORMAT
         file.attrs["program"] = f"fenchel {__version__}"
         file.attrs["python"] = platform.python_version()
-        file.attrs["conventions"] = "SI units; tension positive; Mandel components (11, 22, 33, √2·23, √2·13, √2·12); frame first"
+        file.attrs["conventions"] = "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
         file.attrs["settings"] = json.dumps(settings, sort_keys=True)
         for key, value in content.items():
             _put(file, key, value)
