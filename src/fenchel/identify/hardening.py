@@ -17,14 +17,14 @@ marked as not separable.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
+from .bounded_fit import bounded_least_squares
 from .curves import Curves, deviator, thin
 from .elastic import ElasticFit
 from .options import IdentifyOptions
@@ -147,39 +147,6 @@ def sensitivity(
     return np.stack(columns, axis=1)
 
 
-def _solve(
-    problem: _Problem, unpack: Callable[[Array], LawParameters], start: Array, scale: Array, upper: Array
-) -> tuple[Array, Array]:
-    """Bounded least squares in scaled unknowns y = x/scale ≥ 0; returns (x, mask of values at their lower bound)."""
-    from scipy.optimize import least_squares
-
-    low, high = np.zeros(len(start)), upper / scale
-    begin = np.clip(start / scale, 1e-6, high * (1 - 1e-6))
-
-    def fun(y: Array) -> Array:
-        return problem.residual(unpack(y * scale))
-
-    def slope(y: Array) -> Array:
-        centre = fun(y)
-        columns = []
-        for k in range(len(y)):
-            h = 1e-5 if y[k] + 1e-5 <= high[k] else -1e-5
-            shifted = y.copy()
-            shifted[k] += h
-            columns.append((fun(shifted) - centre) / h)
-        return np.stack(columns, axis=1)
-
-    jac: Any = slope
-    found = least_squares(
-        fun, begin, jac=jac, bounds=(low, high), method="dogbox", ftol=1e-10, xtol=1e-8, gtol=1e-12, max_nfev=60
-    )
-    if not found.success:
-        raise ConvergenceError(
-            f"the fit of the hardening did not settle in 60 steps (misfit {np.sqrt(2 * found.cost):.2e})"
-        )
-    return found.x * scale, found.x <= 1e-4
-
-
 def _stage(
     problem: _Problem,
     parameters: LawParameters,
@@ -208,7 +175,7 @@ def _fit(
     problem: _Problem, start: LawParameters, free_yield: bool, tied: bool, level: float
 ) -> tuple[LawParameters, tuple[str, ...]]:
     """Least squares over (t, C_0 if `free_yield`) and (H_k, H_i), or H_eff alone if `tied` (all of it in H_k)."""
-    hard = max(effective_hardening(start.H_k, start.H_i, start.t), 1e-3 * start.E_s)
+    hard = max(effective_hardening(start.H_k, start.H_i, start.t), 0.02 * start.E_s)
     names = (("theta_f", "C_0") if free_yield else ()) + (("H_eff",) if tied else ("H_k", "H_i"))
     begin = {"theta_f": start.t, "C_0": start.C_0, "H_k": start.H_k, "H_i": start.H_i, "H_eff": hard}
     scale = {"theta_f": 0.3, "C_0": 0.1 * level, "H_k": hard, "H_i": hard, "H_eff": hard}
@@ -231,9 +198,10 @@ def _fit(
     def pick(table: dict[str, float]) -> Array:
         return np.array([table[name] for name in names])
 
-    x, mask = _solve(problem, unpack, pick(begin), pick(scale), pick(top))
-    x = np.where(mask, 0.0, x)
-    return unpack(x), tuple(name for name, low in zip(names, mask, strict=True) if low)
+    units = pick(scale)
+    y = bounded_least_squares(lambda v: problem.residual(unpack(v * units)), pick(begin) / units, pick(top) / units)
+    y = np.where(y <= 1e-6, 0.0, y)
+    return unpack(y * units), tuple(name for name, value in zip(names, y, strict=True) if value == 0.0)
 
 
 def fit_hardening(
