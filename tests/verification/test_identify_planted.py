@@ -149,7 +149,7 @@ def noisy():
         for seed in (1, 2)
     ]
     options = IdentifyOptions(held_out=(6e4,), fit_frames=24, strength_strains=(0.005,))
-    return identify_law(specimens, options, simulate=simulate)
+    return identify_law(specimens, options)
 
 
 def test_intervals_are_honest_under_noise(noisy):
@@ -188,12 +188,8 @@ def test_held_out_pressure_is_predicted_and_not_fitted(noisy):
 def test_one_sample_has_octant_intervals_and_bare_histories_none():
     options = IdentifyOptions(fit_frames=30)
     pressures = (5e4, 9e4)
-    one = identify_law(
-        [Specimen(seed=3, linked={P: planted_law.record(TABLE_3, P, 3) for P in pressures})], options, simulate=simulate
-    )
+    one = identify_law([Specimen(seed=3, linked={P: planted_law.record(TABLE_3, P, 3) for P in pressures})], options)
     assert one.estimates["E_s"].source == "octants" and one.control is None
-    bare = identify_law(
-        [Specimen(seed=3, linked={P: planted_law.history(TABLE_3, P) for P in pressures})], options, simulate=simulate
-    )
+    bare = identify_law([Specimen(seed=3, linked={P: planted_law.history(TABLE_3, P) for P in pressures})], options)
     assert bare.estimates["E_s"].source == "none" and np.isnan(bare.estimates["E_s"].low)
     assert any("without intervals" in text for text in bare.findings)

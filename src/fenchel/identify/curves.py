@@ -51,6 +51,7 @@ class Curves:
 
     pressure: float  # confining pressure [Pa]
     leg: NDArray[np.int64]
+    box_strain: Array  # (frame_count,) axial strain of the box: the same for every phase and octant
     strain: Array  # (frame_count, 6) of the sand, Mandel: the strain of the law
     strain_wire: Array  # (frame_count, 6) of the wires, Mandel
     sand: Array  # (frame_count, 6) stress of the sand, whole, Mandel
@@ -110,6 +111,7 @@ def curves(history: PhaseHistory, split: str = "links") -> Curves:
     return Curves(
         pressure=float(history.pressure),
         leg=np.asarray(history.leg, dtype=np.int64),
+        box_strain=np.asarray(history.axial_strain, dtype=float),
         strain=tensors["strain_sand"],
         strain_wire=tensors["strain_wire"],
         sand=tensors["stress_sand"],
@@ -128,6 +130,7 @@ def thin(test: Curves, count: int) -> Curves:
     return Curves(
         pressure=test.pressure,
         leg=test.leg[keep],
+        box_strain=test.box_strain[keep],
         strain=test.strain[keep],
         strain_wire=test.strain_wire[keep],
         sand=test.sand[keep],

@@ -92,11 +92,11 @@ def _window(tests: Sequence[Curves], window: float, phase: str, own: bool) -> tu
     """Strain and stress increment of a phase on the first leg up to `window`, stacked; shape (n, 6) each."""
     strains, stresses = [], []
     for test in tests:
-        inside = (test.leg == 0) & (np.abs(test.axial_strain) <= window * (1.0 + 1e-9))
+        inside = (test.leg == 0) & (np.abs(test.box_strain - test.box_strain[0]) <= window * (1.0 + 1e-9))
         inside[0] = False  # the reference state itself
-        if phase == "sand" and inside.sum() < 2:
+        if phase == "sand" and not inside.any():
             raise InputError(
-                f"the test at {test.pressure:g} Pa has {int(inside.sum())} frames below an axial strain of {window:g}: "
+                f"the test at {test.pressure:g} Pa has no frame below an axial strain of {window:g}: "
                 "record more frames or widen the elastic window"
             )
         strain = test.strain_wire if (own and phase == "wire") else test.strain
@@ -125,7 +125,7 @@ def elastic_moduli(tests: Sequence[Curves], options: IdentifyOptions, *, strain:
     """E_s, E_w and the common ν from the starts of the tests; per pressure and pooled.
 
     `strain`: "shared" or "own", default `options.strain`. A control without wire stress gives E_w = 0 and ν from the sand.
-    Raises `InputError` when a test has fewer than two frames in the elastic window.
+    Raises `InputError` when a test has no frame in the elastic window.
     """
     choice = strain or options.strain
     own = choice == "own"

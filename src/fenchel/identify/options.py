@@ -37,7 +37,7 @@ class IdentifyOptions:
     held_out: tuple[float, ...] = ()  # confining pressures [Pa] predicted, not fitted
     split: str = "links"  # stress of the bead contacts: "links" to the sand, "total" to the wires
     strain: str = "shared"  # "shared" or "own"
-    window_sand: float = 2e-4  # |axial strain| up to which the sand is taken as elastic [-]
+    window_sand: float = 2e-4  # axial strain of the box up to which the sand is taken as elastic [-]
     window_wire: float = 5e-3  # the same for the wires, whose stress is small at the start [-]
     poisson_bounds: tuple[float, float] = (0.0, 0.49)
     plastic_window: tuple[float, float] = (2e-4, 1.0)  # equivalent plastic strain p used for yield and hardening [-]

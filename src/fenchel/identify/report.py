@@ -160,13 +160,14 @@ def write_report(
     `signs`: "tension-positive" or "compression-positive", for the axes. Raises `StorageError` when a file cannot be written.
     """
     folder = Path(directory)
-    page = _page(found, runs_info, Signs(signs))
+    axes = Signs(signs)
     # the pictures' data (positions, series) stay in the run files
     info = {key: jsonable(value) for key, value in vars(runs_info).items() if key not in ("sample", "series")}
     numbers = {"identification": found.to_json(), "runs": info}
     text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     try:
         folder.mkdir(parents=True, exist_ok=True)
+        page = _page(found, runs_info, axes)
         (folder / "report.json").write_text(text, encoding="utf-8")
         write_law(found, folder)
         (folder / "report.html").write_text(page, encoding="utf-8")
