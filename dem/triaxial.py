@@ -1,7 +1,7 @@
 r"""The triaxial test: lateral walls keep the pressure, the axial pair follows a path of logarithmic strain.
 
-The rate follows from the inertial number, ε̇ = I/t_i with t_i = d √(ρ/P), d = 2 r̄; the wall velocity is ramped over 3 t_i at the start
-and at every reversal, so that no shock is measured. Strains count from the start of the test. The measuring sphere is fixed in space
+The rate follows from the inertial number, ε̇ = I/t_i with t_i = d √(ρ/P), d = 2 r̄; the wall velocity is ramped over 3 t_i up from the
+start and from every reversal and down before it, so that no shock is measured and no strain is overshot. Strains count from the start of the test. The measuring sphere is fixed in space
 at the centre of the box; the reference set of the strain is the bodies whose centres lie in it at the start.
 
 Inertial number: GDR MiDi (2004), Eur. Phys. J. E 14, 341–365.
@@ -104,14 +104,21 @@ class TriaxialTest:
 
     def advance(self) -> dict[str, float]:
         """One step, returns its measures; a frame is stored at the start, every `frame_strain`, and at the end of each leg."""
-        if self.steps == 0 and not self.prestressed:
-            self.assembly.release_links()
+        if self.steps == 0:
+            # loose bodies still drift after the preparation: caught by links they would make a shock
+            self.assembly.velocity[:] = 0.0
+            self.assembly.spin[:] = 0.0
+            if not self.prestressed:
+                self.assembly.release_links()
         target = self.path[self.leg + 1]
         heading = 1.0 if target > self.path[self.leg] else -1.0
         ramp = self.step / (3.0 * self.time_scale)
         # the first step only brings the sample to rest under the law of the test: frame zero
         if self.steps > 0:
-            self.speed = float(np.clip(self.speed + heading * ramp, -1.0, 1.0))
+            # brake so as to arrive slowly: 3 t_i of constant deceleration take 1.5 I of strain
+            remaining = max((target - self.strain) * heading, 0.0)
+            most = min(1.0, max(0.05, float(np.sqrt(remaining / (1.5 * self.rate * self.time_scale)))))
+            self.speed = float(np.clip(self.speed + heading * ramp, -most, most))
         drive = Drive(pressure=np.full(3, self.pressure))
         drive.rate[2] = self.speed * self.rate * self.assembly.half[2]
         measures = self.simulation.advance(self.step, drive)
