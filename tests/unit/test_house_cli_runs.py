@@ -10,7 +10,7 @@ from fenchel import cli
 
 SCENE = """
 [grains]
-count = 40
+count = 60
 normal_stiffness = 4.3e4
 [triaxial]
 strain_path = [0.0, -0.0005]
