@@ -67,6 +67,8 @@ def test_all_seven_are_recovered(law):
         assert stage.misfit < 1e-6
         for name in SEVEN:
             assert getattr(stage.parameters, name) == pytest.approx(getattr(law, name), rel=1e-2), name
+    free = fit.hardening.free_stiffness
+    assert free is not None and free.parameters.E_s == pytest.approx(law.E_s, rel=1e-3)
     assert fit.elastic.nu == pytest.approx(law.nu, rel=1e-6)
     assert fit.yielding.H_eff == pytest.approx(effective_hardening(law.H_k, law.H_i, tan(law.theta_f)), rel=1e-6)
     assert fit.elastic.E_w_bilateral < 0.5 * fit.elastic.E_w  # the bilateral reading is far off

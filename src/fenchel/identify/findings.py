@@ -69,6 +69,12 @@ def _hardening(found: Identification) -> list[str]:
     out.append(
         f"Misfit of q: {staged.misfit:.1%} with the staged values, {joint.misfit:.1%} after the joint refinement."
     )
+    free = hard.free_stiffness
+    if free is not None and free.misfit < 0.85 * joint.misfit:
+        out.append(
+            f"With E_s free too the misfit falls to {free.misfit:.1%} at E_s = {free.parameters.E_s / 1e6:.3g} MPa (small strain: "
+            f"{joint.parameters.E_s / 1e6:.3g} MPa): the grains soften before they yield, the law does not."
+        )
     shift = abs(joint.parameters.theta_f - staged.parameters.theta_f) / max(staged.parameters.theta_f, 1e-3)
     if shift > 0.2:
         first, whole = staged.parameters, joint.parameters

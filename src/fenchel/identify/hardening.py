@@ -4,15 +4,14 @@ Minimise over the fitted tests i (each with the same weight)
 
     J = Σ_i (1/n_i) Σ_k [(q_law,i(ε_k) − q_i,k)/max|q_i|]²,        H_k, H_i, C_0, t ≥ 0,
 
-by a Gauss–Newton method with bounds. "Staged": (H_k, H_i) with t and C_0 from the yield line. "Joint": (t, C_0, H_k,
-H_i) from there,
-with E_s, E_w and ν kept. Only q is fitted: the flow is associated, dilates from first yield, and cannot follow the volume.
+by a Gauss–Newton method with bounds. "Staged": (H_k, H_i) with t and C_0 from the yield line. "Joint": (t, C_0, H_k, H_i)
+from there, with E_s, E_w and ν kept; a last fit with E_s free as well says what the small-strain modulus costs. Only q is
+fitted: the flow is associated, dilates from first yield, and cannot follow the volume.
 
-On a monotonic leg the law feels H_k and H_i only through H_eff = H_k(½ + t²/3) + H_i, so the columns ∂q/∂H_k and
-∂q/∂H_i are parallel
-(ratio ½ + t²/3). A reversal that reaches plastic flow in extension parts them. The condition number of these two raw columns at
-the fitted point decides: above the limit one number is fitted, H_eff (carried by H_k alone, H_i = 0), and the two are
-marked as not separable.
+On a monotonic leg the law feels H_k and H_i only through H_eff = H_k(½ + t²/3) + H_i, so the columns ∂q/∂H_k and ∂q/∂H_i are
+parallel (ratio ½ + t²/3). A reversal that reaches plastic flow in extension parts them. The condition number of these two
+raw columns at the fitted point decides: above the limit one number is fitted, H_eff (carried by H_k alone, H_i = 0), and
+the two are marked as not separable.
 """
 
 from __future__ import annotations
@@ -58,6 +57,7 @@ class HardeningFit:
 
     staged: Stage
     joint: Stage
+    free_stiffness: Stage | None  # E_s fitted as well: what the small-strain modulus costs; never exported
     names: tuple[str, ...]  # columns of the sensitivity matrix
     singular_values: tuple[float, ...]  # of the raw columns, all tests stacked
     hardening_singular_values: tuple[float, ...]  # of the block (H_k, H_i)
@@ -172,19 +172,21 @@ def _stage(
 
 
 def _fit(
-    problem: _Problem, start: LawParameters, free_yield: bool, tied: bool, level: float
+    problem: _Problem, start: LawParameters, free_yield: bool, tied: bool, level: float, *, stiffness: bool = False
 ) -> tuple[LawParameters, tuple[str, ...]]:
-    """Least squares over (t, C_0 if `free_yield`) and (H_k, H_i), or H_eff alone if `tied` (all of it in H_k)."""
+    """Least squares over (t, C_0 if `free_yield`) and (H_k, H_i), or H_eff alone if `tied` (all of it in H_k); E_s too if `stiffness`."""
     hard = max(effective_hardening(start.H_k, start.H_i, start.t), 0.02 * start.E_s)
     names = (("theta_f", "C_0") if free_yield else ()) + (("H_eff",) if tied else ("H_k", "H_i"))
-    begin = {"theta_f": start.t, "C_0": start.C_0, "H_k": start.H_k, "H_i": start.H_i, "H_eff": hard}
-    scale = {"theta_f": 0.3, "C_0": 0.1 * level, "H_k": hard, "H_i": hard, "H_eff": hard}
+    names += ("E_s",) if stiffness else ()
+    begin = {"theta_f": start.t, "C_0": start.C_0, "H_k": start.H_k, "H_i": start.H_i, "H_eff": hard, "E_s": start.E_s}
+    scale = {"theta_f": 0.3, "C_0": 0.1 * level, "H_k": hard, "H_i": hard, "H_eff": hard, "E_s": start.E_s}
     top = {
         "theta_f": MAX_SLOPE,
         "C_0": 10.0 * level,
         "H_k": 10.0 * start.E_s,
         "H_i": 10.0 * start.E_s,
         "H_eff": 10.0 * start.E_s,
+        "E_s": 10.0 * start.E_s,
     }
 
     def unpack(x: Array) -> LawParameters:
@@ -193,7 +195,14 @@ def _fit(
         floor = 1e-7 * start.E_s  # keeps the limit load regular; a value there counts as zero
         H_k = max(values["H_eff"] / (0.5 + t * t / 3.0) if tied else values["H_k"], floor)
         H_i = 0.0 if tied else values["H_i"]
-        return _with(start, t=t, C_0=max(values.get("C_0", start.C_0), 1e-6 * level), H_k=H_k, H_i=H_i)
+        return _with(
+            start,
+            t=t,
+            C_0=max(values.get("C_0", start.C_0), 1e-6 * level),
+            H_k=H_k,
+            H_i=H_i,
+            E_s=max(values.get("E_s", start.E_s), 0.02 * start.E_s),
+        )
 
     def pick(table: dict[str, float]) -> Array:
         return np.array([table[name] for name in names])
@@ -259,11 +268,16 @@ def fit_hardening(
         values, bound = _fit(problem, begin, True, True, level)
         joint = _stage(problem, values, simulate, options.condition_limit, bound, True)
         joint = Stage(**{**vars(joint), "condition": condition, "column_ratio": ratio})
+    free = None
+    if start is None:
+        values, bound = _fit(problem, joint.parameters, True, not joint.separable, level, stiffness=True)
+        free = _stage(problem, values, simulate, options.condition_limit, bound, not joint.separable)
     names = ("t", "C_0", "H_k", "H_i")
     matrix = sensitivity(thinned, joint.parameters, names, simulate)
     return HardeningFit(
         staged=staged,
         joint=joint,
+        free_stiffness=free,
         names=names,
         singular_values=tuple(float(v) for v in np.linalg.svd(matrix, compute_uv=False)),
         hardening_singular_values=tuple(float(v) for v in np.linalg.svd(matrix[:, 2:], compute_uv=False)),

@@ -19,7 +19,8 @@ from .interval import jackknife_deviation
 __all__ = ["Mismatch", "phase_mismatch"]
 
 Array = NDArray[np.float64]
-SMALLEST = 2e-4  # strain [-] below which, or below 1/50 of the largest, the ratio is noise over nothing
+SMALLEST = 2e-4  # strain [-] below which the ratio is noise over nothing
+LATER = 0.3  # after the first leg: below this part of the largest strain (a reversal passes near zero) the ratio says nothing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,7 +39,7 @@ class Mismatch:
 
 def _ratio(test: Curves) -> Array:
     size = np.linalg.norm(test.strain, axis=1)
-    valid = size > max(SMALLEST, 0.02 * float(size.max()))
+    valid = size > np.where(test.leg == 0, SMALLEST, LATER * float(size.max()))
     out = np.full(len(size), np.nan)
     out[valid] = np.linalg.norm(test.strain - test.strain_wire, axis=1)[valid] / size[valid]
     return out

@@ -144,6 +144,7 @@ def _stages(found: Identification) -> Table:
         p = stage.parameters
         apart = stage.separable
         return [
+            number(p.E_s / 1e6),
             number(p.theta_f),
             number(p.C_0 / 1e3),
             number(stage.H_eff / 1e6),
@@ -155,14 +156,23 @@ def _stages(found: Identification) -> Table:
             ", ".join(stage.at_bound) or "none",
         ]
 
-    labels = ["θ_f [rad]", "C_0 [kPa]", "H_eff [MPa]", "H_k [MPa]", "H_i [MPa]", "misfit of q / max|q|, rms"]
+    labels = [
+        "E_s [MPa]",
+        "θ_f [rad]",
+        "C_0 [kPa]",
+        "H_eff [MPa]",
+        "H_k [MPa]",
+        "H_i [MPa]",
+        "misfit of q / max|q|, rms",
+    ]
     labels += ["condition number of (∂q/∂H_k, ∂q/∂H_i)", "column ratio (½ + t²/3 when parallel)", "at the lower bound"]
-    rows = list(zip(labels, column(hard.staged), column(hard.joint), strict=True))
+    stages = [hard.staged, hard.joint, *([hard.free_stiffness] if hard.free_stiffness else [])]
+    rows = list(zip(labels, *(column(stage) for stage in stages), strict=True))
     rows.append(("singular values of (t, C_0, H_k, H_i)", "", ", ".join(number(v, 3) for v in hard.singular_values)))
     return Table(
         key="stages",
         caption="Staged (yield line of the first leg, then H_k and H_i) and joint (all four together, E_s and ν kept)",
-        head=("", "staged", "joint"),
+        head=("", "staged", "joint (the law)", "joint, E_s free")[: 1 + len(stages)],
         rows=tuple(rows),
     )
 
