@@ -6,9 +6,10 @@ where φ, the support function of {f_j ≤ 0}, is written with multipliers: for 
 
     φ(Δ) = min Σ_j k_j γ_j   subject to   Δ = Σ_j (γ_j ∇ℓ_j + Σ_i L_jiᵀ D_ji),  ‖D_ji‖ ≤ a_ji γ_j.
 
-The stress is the multiplier of ε = ε_{n+1}. Built from the declared atoms of ψ and φ*, independently of the closed form: quadratic terms by
-a factor of their Hessian, ⟨x⟩² as a squared positive part, T^≥:T^≥ as min ‖W‖² over W ⪰ T, W ⪰ 0. Strains are counted in a yield strain
-and stresses in a yield stress, so that the program is well conditioned.
+The stress is the multiplier of ε = ε_{n+1}. Built from the declared atoms of ψ and φ*, independently of the closed form:
+quadratic terms by a factor of their Hessian, ⟨x⟩² as a squared positive part, T^≥:T^≥ as min ‖T + N‖² over N ⪰ 0 (the distance
+to the negative semidefinite tensors). Strains are counted in a yield strain and stresses in a yield stress, so that the
+program is well conditioned.
 """
 
 from __future__ import annotations
@@ -29,12 +30,14 @@ __all__ = ["ConicSolution", "ConicStep", "conic_step"]
 
 @dataclass(frozen=True)
 class ConicSolution:
-    """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` [J/m³], status text of the solver."""
+    """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` [J/m³], `status` text and the
+    `tolerance` that clarabel reached (relative, in scaled units)."""
 
     stress: np.ndarray
     state: dict[str, Any]
     objective: float
     status: str
+    tolerance: float
 
 
 @dataclass(frozen=True)
@@ -52,34 +55,42 @@ class ConicStep:
 
     def solve(self, **options: Any) -> ConicSolution:
         """Solve by clarabel; `options` go to the solver. Raises `ConvergenceError` if no solution is found."""
-        settings = {
-            "tol_gap_abs": 1e-11,
-            "tol_gap_rel": 1e-11,
-            "tol_feas": 1e-11,
-            "tol_ktratio": 1e-9,
-            "reduced_tol_gap_abs": 1e-7,
-            "reduced_tol_gap_rel": 1e-7,
-            "reduced_tol_feas": 1e-7,
-            "max_iter": 200,
-            **options,
-        }
         import warnings
 
         import cvxpy
 
-        try:
-            with warnings.catch_warnings():
-                # the tolerances are set beyond what is always reached; the reduced ones above bound what is accepted
-                warnings.simplefilter("ignore", UserWarning)
-                self.problem.solve(solver=cvxpy.CLARABEL, **settings)
-        except cvxpy.error.SolverError as error:
-            raise ConvergenceError(
-                f"law '{self.law.name}': clarabel fails on the step: {str(error).splitlines()[0]}"
-            ) from None
+        reason, reached = "", 1.0
+        for tolerance, equilibrate in (
+            (1e-11, True),
+            (1e-10, True),
+            (1e-9, True),
+            (1e-10, False),
+            (1e-9, False),
+            (1e-8, True),
+        ):
+            if tolerance > 1e-9 and self.problem.status == "optimal_inaccurate":
+                break
+            settings: dict[str, Any] = {
+                **dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance),
+                **dict.fromkeys(("reduced_tol_gap_abs", "reduced_tol_gap_rel", "reduced_tol_feas"), 1e-8),
+                "max_iter": 200,
+                "equilibrate_enable": equilibrate,
+                **options,
+            }
+            try:
+                with warnings.catch_warnings():
+                    # a solution above the tolerance is announced by its status; the next tolerance is tried then
+                    warnings.simplefilter("ignore", UserWarning)
+                    self.problem.solve(solver=cvxpy.CLARABEL, **settings)
+            except cvxpy.error.SolverError as error:
+                reason = str(error).splitlines()[0]
+                continue
+            reason, reached = f"status '{self.problem.status}'", tolerance
+            if self.problem.status == "optimal":
+                break
         if self.problem.status not in ("optimal", "optimal_inaccurate"):
-            raise ConvergenceError(f"law '{self.law.name}': clarabel ends with status '{self.problem.status}'")
-        sign = -1.0
-        stress = sign * np.asarray(self.strain_constraint.dual_value).reshape(6) * self.energy_unit / self.strain_unit
+            raise ConvergenceError(f"law '{self.law.name}': clarabel fails on the step: {reason}")
+        stress = -np.asarray(self.strain_constraint.dual_value).reshape(6) * self.energy_unit / self.strain_unit
         change = (
             np.zeros(0)
             if self.state_variable is None
@@ -89,7 +100,7 @@ class ConicStep:
         layout, _ = state_layout(self.law)
         state = {n: packed[s] if length == 1 else packed[s : s + 6] for n, (s, length) in layout.items()}
         return ConicSolution(
-            stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status
+            stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status, reached
         )
 
 
@@ -151,8 +162,7 @@ def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old
         objective = objective + (weight * strain_unit**2 / energy_unit) * cp.square(cp.pos(row @ change + start))
     for weight, coefficient, shift in energy.spectral:
         target = coefficient * x_eps + (coefficient * eps + shift) / strain_unit
-        part = cp.Variable((3, 3), symmetric=True)
-        constraints += [part >> 0, part - _matrix(cp, target) >> 0]
+        part = _matrix(cp, target) + cp.Variable((3, 3), PSD=True)
         objective = objective + (weight * strain_unit**2 / energy_unit) * cp.sum_squares(part)
     if x_new is not None:
         gamma = cp.Variable(len(flow.limits))

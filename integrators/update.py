@@ -155,7 +155,8 @@ def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
 def check_moduli(law: Law, moduli: Any, values: Array) -> None:
     """Refuse values that make ψ non-convex or infinite, by the moduli that the law's derivation lists."""
     try:
-        entries = moduli(values)
+        with np.errstate(all="ignore"):
+            entries = moduli(values)
     except (ZeroDivisionError, OverflowError, ValueError):
         entries = ((law.name, " ".join(p.name for p in law.parameters), np.nan),)
     table = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
