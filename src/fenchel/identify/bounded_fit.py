@@ -36,7 +36,7 @@ def _columns(residual: Callable[[Array], Array], y: Array, centre: Array, upper:
 
 
 def bounded_least_squares(
-    residual: Callable[[Array], Array], start: Array, upper: Array, *, xtol: float = 1e-7, ftol: float = 1e-12
+    residual: Callable[[Array], Array], start: Array, upper: Array, *, xtol: float = 1e-6, ftol: float = 1e-8
 ) -> Array:
     """Minimiser y of ½‖residual(y)‖² on 0 ≤ y ≤ `upper`, from `start`; unknowns scaled to order one.
 

@@ -25,6 +25,7 @@ from .replay import Simulate, replay
 __all__ = ["Control", "Identification", "identify_law"]
 
 OCTANTS = 8
+REPLICA_FRAMES = 100  # per test: a coarser path shifts all octant replicas alike, not their spread
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,12 +94,13 @@ def _replicas(
     failed = 0
     if not options.jackknife:
         return out, failed
+    coarse = replace(options, fit_frames=min(options.fit_frames, REPLICA_FRAMES))
     for octant in range(OCTANTS):
         tests = _tests(source, fitted, options.split, octant)
         if tests is None:
             return [], 0
         try:
-            out.append(scalars(fit_law(tests, options, simulate, start=start, hardening=hardening)))
+            out.append(scalars(fit_law(tests, coarse, simulate, start=start, hardening=hardening)))
         except (ConvergenceError, InputError):
             out.append({})
             failed += 1
