@@ -122,9 +122,7 @@ class Assembly:
 
     def copy(self) -> Assembly:
         """An independent copy."""
-        return replace(
-            self, **{f.name: getattr(self, f.name).copy() for f in fields(self) if f.name not in _SCALARS}
-        )
+        return replace(self, **{f.name: getattr(self, f.name).copy() for f in fields(self) if f.name not in _SCALARS})
 
     def arrays(self) -> dict[str, Any]:
         """All fields by name, for storage."""
@@ -133,7 +131,9 @@ class Assembly:
     @classmethod
     def from_arrays(cls, data: dict[str, Any]) -> Assembly:
         """Inverse of `arrays`."""
-        return cls(**{f.name: _SCALARS[f.name](data[f.name]) if f.name in _SCALARS else data[f.name] for f in fields(cls)})
+        return cls(
+            **{f.name: _SCALARS[f.name](data[f.name]) if f.name in _SCALARS else data[f.name] for f in fields(cls)}
+        )
 
     def release_links(self) -> None:
         """Make the present link lengths the reference lengths: wires without force."""

@@ -47,9 +47,9 @@ class ContactProgram:
         scale = 1.0 / np.sqrt(np.diag(matrix))
         size = float(np.max(np.abs(scale * self.b))) or 1.0
         # ½‖L y‖² keeps the program positive semidefinite by construction
-        factor = np.concatenate(
-            [np.sqrt(self.inverse_mass)[:, None] * self.h.T, np.diag(np.sqrt(self.compliance))]
-        ) * scale
+        factor = (
+            np.concatenate([np.sqrt(self.inverse_mass)[:, None] * self.h.T, np.diag(np.sqrt(self.compliance))]) * scale
+        )
         y = cp.Variable(len(self.b))
         bounds = [y[self.unilateral] >= 0.0] if self.unilateral.any() else []
         problem = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(factor @ y) + (scale * self.b / size) @ y), bounds)
@@ -65,7 +65,7 @@ class ContactProgram:
                     reduced_tol_gap_rel=tolerance,
                     reduced_tol_feas=tolerance,
                 )
-            except cp.error.SolverError:
+            except cp.SolverError:
                 continue
             if problem.status == "optimal" and y.value is not None:
                 return self._polish(scale * size * np.asarray(y.value))

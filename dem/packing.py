@@ -41,7 +41,9 @@ def lay_wires(
 
 
 @njit
-def _spread(x: Array, radius: Array, pairs: NDArray[np.int32], links: NDArray[np.int32], spacing: float, half: Array) -> float:
+def _spread(
+    x: Array, radius: Array, pairs: NDArray[np.int32], links: NDArray[np.int32], spacing: float, half: Array
+) -> float:
     """One pass of overlap removal and link projection; returns the worst overlap over the smaller radius."""
     worst = 0.0
     for k in range(pairs.shape[0]):
@@ -125,7 +127,7 @@ def densify(
     worst = _relax(assembly, radius, spacing, final_passes, 0.01)
     if not np.all(np.isfinite(x)) or worst > 0.5:
         raise InputError(
-            f"sample: solid fraction {solid_fraction} cannot be reached geometrically (overlap {100 * worst:.0f} % of a radius left); lower it"
+            f"sample: solid fraction {solid_fraction} cannot be reached (overlaps of {100 * worst:.0f} % of a radius are left); lower it"
         )
     assembly.link_length = np.full(len(assembly.links), spacing)
     return assembly

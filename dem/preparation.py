@@ -23,7 +23,7 @@ from .scene import Grains, Sample, SceneSolve, Wires
 from .stepping import Drive, Material, Simulation, Solver
 from .triaxial import inertial_time
 
-__all__ = ["IsotropicStage", "make_sample", "material_of", "pressure_change", "preparation"]
+__all__ = ["IsotropicStage", "make_sample", "material_of", "preparation", "pressure_change"]
 
 
 class IsotropicStage:
@@ -95,7 +95,7 @@ class IsotropicStage:
         self.calm = self.calm + 1 if measures["unbalanced"] < 1e-2 and off < 1e-2 and share >= 1.0 else 0
         if self.steps >= self.most and not self.done:
             raise ConvergenceError(
-                f"{self.name}: not at rest after {self.steps} steps (unbalanced force {measures['unbalanced']:.1e} of the mean contact force, "
+                f"{self.name}: not at rest after {self.steps} steps (unbalanced over contact force {measures['unbalanced']:.1e}, "
                 f"wall pressure off by {100 * off:.2g} %): lower sample.solid_fraction or tighten sample.tolerance"
             )
         return measures
@@ -159,7 +159,15 @@ def preparation(
     keep: dict[str, Any] = {"pressure": pressure, "density": grains.density}
     slackening = [
         IsotropicStage(
-            assembly, smooth, loose, name="slackening", least=60.0, step_fraction=2 * solve.step, slacken=True, to_rest=False, **keep
+            assembly,
+            smooth,
+            loose,
+            name="slackening",
+            least=60.0,
+            step_fraction=2 * solve.step,
+            slacken=True,
+            to_rest=False,
+            **keep,
         )
     ]
     if prestressed or not law.links:

@@ -1,7 +1,7 @@
 r"""How good is a solved step? Recomputed from the impulses alone, by code that shares nothing with the sweeps.
 
-Velocities are rebuilt as v = v_free + M⁻¹ H p. With the compliant relative velocity ũ = (u_n + b + c_n p_n, u_t + c_t (p_t − p_t⁰)), the law
-is Coulomb's cone complementarity K_μ ∋ p ⊥ û ∈ K_μ*, û = ũ + μ‖ũ_t‖ n, and the natural map
+Velocities are rebuilt as v = v_free + M⁻¹ H p. With the compliant relative velocity ũ = (u_n + b + c_n p_n, u_t + c_t (p_t − p_t⁰)),
+the law is Coulomb's cone complementarity K_μ ∋ p ⊥ û ∈ K_μ*, û = ũ + μ‖ũ_t‖ n, and the natural map
 
     ‖p − P_K(p − ρ û)‖ / ‖p‖ ,   ρ = 1/(W_n + c_n) per contact,
 

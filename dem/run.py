@@ -20,8 +20,8 @@ from .bodies import Assembly
 from .preparation import make_sample, material_of, preparation
 from .record import TriaxialRecord
 from .scene import Scene, read_scene
-from .storage import load_run, save_run
 from .stepping import Solver
+from .storage import load_run, save_run
 from .triaxial import TriaxialTest
 
 __all__ = [

@@ -14,7 +14,17 @@ from msgspec import Meta
 
 from ..errors import InputError
 
-__all__ = ["Grains", "Sample", "Scene", "SceneSolve", "SceneTriaxial", "Wires", "check_scene", "read_scene", "read_toml"]
+__all__ = [
+    "Grains",
+    "Sample",
+    "Scene",
+    "SceneSolve",
+    "SceneTriaxial",
+    "Wires",
+    "check_scene",
+    "read_scene",
+    "read_toml",
+]
 
 Name = Literal["rigid_rod", "elastic_rod", "rigid_wire", "elastic_wire"]
 
@@ -30,7 +40,9 @@ class Grains(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     radius: Annotated[tuple[float, float], _key("smallest and largest radius", "m")] = (0.75e-3, 1.39e-3)
     density: Annotated[float, _key("mass density of a grain", "kg/m³", gt=0)] = 2600.0
     friction: Annotated[float, _key("Coulomb coefficient between grains", "1", ge=0)] = 0.4
-    normal_stiffness: Annotated[float | None, _key("normal contact stiffness; leave out for rigid grains", "N/m")] = None
+    normal_stiffness: Annotated[float | None, _key("normal contact stiffness; leave out for rigid grains", "N/m")] = (
+        None
+    )
     stiffness_ratio: Annotated[float, _key("tangential over normal stiffness", "1", gt=0)] = 0.8
 
 
@@ -47,7 +59,9 @@ class Wires(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     friction: Annotated[float | None, _key("Coulomb coefficient of beads; default: that of the grains", "1")] = None
     state: Annotated[
         Literal["stress_free", "prestressed"],
-        _key("stress_free: reference lengths reset at each pressure; prestressed: links act from the preparation on", "–"),
+        _key(
+            "stress_free: reference lengths reset at each pressure; prestressed: links act from the preparation on", "–"
+        ),
     ] = "stress_free"
     control: Annotated[bool, _key("repeat every test with the same beads unlinked", "–")] = True
 
@@ -57,27 +71,37 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
 
     solid_fraction: Annotated[float, _key("of grains and beads, before compression", "1", gt=0, le=0.62)] = 0.57
     friction: Annotated[float, _key("Coulomb coefficient during compression: 0 gives a dense sample", "1", ge=0)] = 0.0
-    tolerance: Annotated[float, _key("relative impulse change that stops the sweeps of the preparation", "1", gt=0, lt=1)] = 1e-4
+    tolerance: Annotated[
+        float, _key("relative impulse change that stops the sweeps of the preparation", "1", gt=0, lt=1)
+    ] = 1e-4
 
 
 class SceneTriaxial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The triaxial test: lateral walls keep the pressure, the axial ones follow a strain path."""
 
     pressure: Annotated[float, _key("confining pressure", "Pa")] = 5e4
-    strain_path: Annotated[tuple[float, ...], _key("logarithmic axial strains to visit, tension positive, first 0", "1")] = (
+    strain_path: Annotated[
+        tuple[float, ...], _key("logarithmic axial strains to visit, tension positive, first 0", "1")
+    ] = (
         0.0,
         -0.01,
     )
     inertial_number: Annotated[float, _key("I = ε̇ d √(ρ/P), sets the rate", "1", gt=0, le=0.1)] = 5e-4
-    sphere: Annotated[float, _key("radius of the measuring sphere over the half width of the box", "1", gt=0, le=1)] = 0.8
+    sphere: Annotated[float, _key("radius of the measuring sphere over the half width of the box", "1", gt=0, le=1)] = (
+        0.8
+    )
     frame_strain: Annotated[float, _key("axial strain between stored frames", "1", gt=0)] = 1e-4
 
 
 class SceneSolve(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The solver of the one-step problems."""
 
-    tolerance: Annotated[float, _key("relative impulse change that stops the sweeps of the test", "1", gt=0, lt=1)] = 1e-5
-    sweep_limit: Annotated[int, _key("most sweeps a step; reached above the tolerance the run stops with an error", "1", ge=1)] = 5000
+    tolerance: Annotated[float, _key("relative impulse change that stops the sweeps of the test", "1", gt=0, lt=1)] = (
+        1e-5
+    )
+    sweep_limit: Annotated[
+        int, _key("most sweeps a step; reached above the tolerance the run stops with an error", "1", ge=1)
+    ] = 5000
     step: Annotated[float, _key("time step over the inertial time d √(ρ/P)", "1", gt=0, le=1)] = 0.05
 
 
@@ -181,7 +205,9 @@ def check_bodies(grains: Grains, wires: Wires | None, sample: Sample, name: str)
 def check_path(path: tuple[float, ...], name: str) -> None:
     """Rules of a strain path."""
     if len(path) < 2 or path[0] != 0.0:
-        raise InputError(f"{name}: triaxial.strain_path must start at 0 and visit at least one strain, e.g. [0.0, -0.01]")
+        raise InputError(
+            f"{name}: triaxial.strain_path must start at 0 and visit at least one strain, e.g. [0.0, -0.01]"
+        )
     if any(a == b for a, b in zip(path[1:], path[:-1], strict=True)):
         raise InputError(f"{name}: triaxial.strain_path repeats a strain; every entry must differ from the one before")
     if max(abs(e) for e in path) > 0.2:

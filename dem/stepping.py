@@ -144,9 +144,22 @@ class Simulation:
         ct = 1.0 / (law.tangential_stiffness * step**2)
         reach = 0.04 * a.grain_radius
         pair, contact = collect_contacts(
-            a.x, a.radius, before, a.is_bead, a.pairs, a.pair_impulse, reach, step, cn, ct, law.friction, law.bead_friction
+            a.x,
+            a.radius,
+            before,
+            a.is_bead,
+            a.pairs,
+            a.pair_impulse,
+            reach,
+            step,
+            cn,
+            ct,
+            law.friction,
+            law.bead_friction,
         )
-        wall, wall_row = collect_walls(a.x, a.radius, before, a.half, box_before, a.walls, a.wall_impulse, reach, step, cn)
+        wall, wall_row = collect_walls(
+            a.x, a.radius, before, a.half, box_before, a.walls, a.wall_impulse, reach, step, cn
+        )
         wire = WIRE_LAWS[law.wire_law]
         link = a.links if law.links else a.links[:0]
         link_row = collect_links(
@@ -197,8 +210,10 @@ class Simulation:
             )
         if self.change > solver.tolerance and not solver.keep_unconverged:
             raise ConvergenceError(
-                f"NLGS stopped after {self.sweeps} sweeps at a relative impulse change of {self.change:.2e} > {solver.tolerance:.0e} "
-                f"(natural map {measures[0]:.2e}, t = {a.time:.6g} s): raise solve.sweep_limit, reduce the step, or give the grains a stiffness"
+                f"NLGS stopped after {self.sweeps} sweeps at a relative impulse change of {self.change:.2e} "
+                f"> {solver.tolerance:.0e} "
+                f"(natural map {measures[0]:.2e}, t = {a.time:.6g} s): raise solve.sweep_limit, reduce "
+                "the step, or give the grains a stiffness"
             )
         a.elastic_energy = float(measures[9])
         a.velocity, a.spin = vel[:, 0:3].copy(), vel[:, 3:6].copy()

@@ -35,8 +35,10 @@ UNITS = {
 
 def replace_file(path: Path | str, data: bytes) -> None:
     """Write `data` so that `path` holds either its old or its new content, never a part; `StorageError` if it cannot."""
-    path = Path(path)
+    path = Path(path).resolve()  # through a link, so that the link stays one
     temporary = None
+    if path.exists() and not path.is_file():
+        raise StorageError(f"{path}: is a folder or a device, not a file; choose a file name")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
@@ -50,7 +52,8 @@ def replace_file(path: Path | str, data: bytes) -> None:
         if temporary is not None:
             Path(temporary).unlink(missing_ok=True)
         raise StorageError(
-            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: free some space or choose another place"
+            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: "
+            "free some space or choose another place"
         ) from None
 
 
@@ -87,7 +90,9 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
         file.attrs["format"] = FORMAT
         file.attrs["program"] = f"fenchel {__version__}"
         file.attrs["python"] = platform.python_version()
-        file.attrs["conventions"] = "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
+        file.attrs["conventions"] = (
+            "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
+        )
         file.attrs["settings"] = json.dumps(settings, sort_keys=True)
         for key, value in content.items():
             _put(file, key, value)
@@ -102,14 +107,20 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
     try:
         with h5py.File(path, "r") as file:
             if "settings" not in file.attrs:
-                raise InputError(f"{path}: not a run file of fenchel (no settings in it): give a file written by `fenchel dem`")
+                raise InputError(
+                    f"{path}: not a run file of fenchel (no settings in it): give a file written by `fenchel dem`"
+                )
             if int(file.attrs["format"]) != FORMAT:
-                raise InputError(f"{path}: format {file.attrs['format']} is not {FORMAT}: run it again with this version")
+                raise InputError(
+                    f"{path}: format {file.attrs['format']} is not {FORMAT}: run it again with this version"
+                )
             content = _take(file)
     except FileNotFoundError:
         raise InputError(f"{path}: no such run file: check the name") from None
     except (OSError, RuntimeError, KeyError, ValueError) as error:
-        raise InputError(f"{path}: unreadable or truncated run file ({str(error).splitlines()[0]}): run it again") from None
+        raise InputError(
+            f"{path}: unreadable or truncated run file ({str(error).splitlines()[0]}): run it again"
+        ) from None
     settings = json.loads(content.pop("settings"))
     for key in ("format", "program", "python", "conventions"):
         content.pop(key, None)

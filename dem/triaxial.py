@@ -1,8 +1,9 @@
 r"""The triaxial test: lateral walls keep the pressure, the axial pair follows a path of logarithmic strain.
 
 The rate follows from the inertial number, ε̇ = I/t_i with t_i = d √(ρ/P), d = 2 r̄; the wall velocity is ramped over 3 t_i up from the
-start and from every reversal and down before it, so that no shock is measured and no strain is overshot. Strains count from the start of the test. The measuring sphere is fixed in space
-at the centre of the box; the reference set of the strain is the bodies whose centres lie in it at the start.
+start and from every reversal and down before it, so that no shock is measured and no strain is overshot. Strains count from the
+start of the test. The measuring sphere is fixed in space at the centre of the box; the reference set of the strain is the bodies
+whose centres lie in it at the start.
 
 Inertial number: GDR MiDi (2004), Eur. Phys. J. E 14, 341–365.
 """

@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 from fenchel.dem.run import Progress, load_record, run_scene
 from fenchel.dem.scene import Grains, Scene, SceneTriaxial, Wires
 from fenchel.dem.storage import load_run, replace_file, save_run

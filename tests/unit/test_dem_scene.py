@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+
 from fenchel.dem.scene import read_scene
 from fenchel.errors import InputError
 from fenchel.identify.study import demo_study, read_study
@@ -20,7 +21,10 @@ BAD = {
     "reversed radii": ("[grains]\nradius = [2e-3, 1e-3]\n", ["grains.radius", "smallest"]),
     "wire longer than fits": ("[wires]\nbeads = 500\n", ["wires", "does not fit"]),
     "unknown law": ('[wires]\nlaw = "rope"\n', ["wires.law", "rope"]),
-    "path that does not start at zero": ("[triaxial]\nstrain_path = [0.1, 0.0]\n", ["triaxial.strain_path", "start at 0"]),
+    "path that does not start at zero": (
+        "[triaxial]\nstrain_path = [0.1, 0.0]\n",
+        ["triaxial.strain_path", "start at 0"],
+    ),
     "repeated strain": ("[triaxial]\nstrain_path = [0.0, -0.01, -0.01]\n", ["triaxial.strain_path", "repeats"]),
     "not TOML": ("grains = {", ["TOML"]),
     "tolerance one": ("[solve]\ntolerance = 1.0\n", ["solve.tolerance"]),

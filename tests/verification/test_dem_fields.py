@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+
 from fenchel.dem import Assembly, Drive, Material, Simulation, Solver, TriaxialRecord, TriaxialTest, mandel
 from fenchel.dem.homogenise import _inside, fit_sums, moments, wall_stress
 from fenchel.dem.preparation import make_sample, material_of, preparation
@@ -25,7 +26,9 @@ def rested(request: pytest.FixtureRequest) -> Assembly:
     return assembly
 
 
-def triaxial(assembly: Assembly, *, linked: bool, path: tuple[float, ...], inertial: float = 1e-3, **law: float) -> TriaxialTest:
+def triaxial(
+    assembly: Assembly, *, linked: bool, path: tuple[float, ...], inertial: float = 1e-3, **law: float
+) -> TriaxialTest:
     test = TriaxialTest(
         assembly.copy(),
         replace(material_of(GRAINS, WIRES), links=linked, **law),
@@ -67,7 +70,9 @@ def test_love_weber_and_the_split_by_phase(rested: Assembly) -> None:
     assert np.linalg.norm(m[:, 8].sum(axis=0) - whole) < 1e-12 * np.linalg.norm(whole)
     # a sphere around everything is the whole; smaller ones hold the octants apart without loss
     everything = moments(a, rows, 10.0 * float(a.half.max()))
-    np.testing.assert_allclose(everything[:, :8].sum(axis=1), everything[:, 8], rtol=0, atol=1e-12 * np.linalg.norm(whole))
+    np.testing.assert_allclose(
+        everything[:, :8].sum(axis=1), everything[:, 8], rtol=0, atol=1e-12 * np.linalg.norm(whole)
+    )
 
 
 def test_part_of_a_segment_in_a_sphere() -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from fenchel.dem import Assembly, Drive, Material, Simulation, Solver
 from fenchel.dem.certificate import contact_program
 from fenchel.dem.detection import find_pairs
@@ -17,7 +18,13 @@ PRESSURE = 5e4
 def sample(seed: int = 0, count: int = 40) -> Assembly:
     radius = np.random.default_rng(seed + 100).uniform(0.75e-3, 1.39e-3, count)
     return densify(
-        np.random.default_rng(seed), radius, wire_count=3, beads=5, spacing=1e-3, bead_radius=0.4e-3, solid_fraction=0.45
+        np.random.default_rng(seed),
+        radius,
+        wire_count=3,
+        beads=5,
+        spacing=1e-3,
+        bead_radius=0.4e-3,
+        solid_fraction=0.45,
     )
 
 
@@ -80,8 +87,10 @@ def natural_map(before: np.ndarray, free: np.ndarray, box_free: np.ndarray, rows
             h[:, 6 * body : 6 * body + 3] = sign * np.eye(3)
             h[:, 6 * body + 3 : 6 * body + 6] = -cross.T
         p = row[3:6]
-        law = lambda u, p=p, n=n, row=row: (  # noqa: E731
-            u + (row[9] + rows.cn * (p @ n)) * n + rows.ct * (p - (p @ n) * n - row[6:9])
+        law = (
+            lambda u, p=p, n=n, row=row: (  # noqa: E731
+                u + (row[9] + rows.cn * (p @ n)) * n + rows.ct * (p - (p @ n) * n - row[6:9])
+            )
         )
         blocks.append((h, p, n, row[12], row[10], law))
     for (i, axis, side), row in zip(rows.wall, rows.wall_row, strict=True):

@@ -5,6 +5,7 @@ from __future__ import annotations
 import platform
 import time
 from collections.abc import Callable, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,6 @@ from .. import __version__
 from ..dem.bodies import Assembly
 from ..dem.record import TriaxialRecord
 from ..dem.storage import load_run, replace_file
-
 from .bars import Bars
 from .identification import Identification, identify_law
 from .options import Specimen
@@ -127,11 +127,7 @@ def _runs_info(
     probes: Sequence[dict[str, Any]],
     clock: dict[str, float],
 ) -> RunsInfo:
-    import cvxpy
-    import numba
-    import numpy
-    import scipy
-    import sympy
+    from importlib.metadata import version
 
     content, _ = load_run(prepared.state_file(study.pressures[0]))
     assembly = Assembly.from_arrays(content["assembly"])
@@ -144,10 +140,11 @@ def _runs_info(
     }
     return RunsInfo(
         settings=flat,
-        seconds={name: now - before for (_, before), (name, now) in zip(stamps, stamps[1:], strict=False)},
+        seconds={name: now - before for (_, before), (name, now) in pairwise(stamps)},
         versions={
-            "fenchel": __version__, "python": platform.python_version(), "numpy": numpy.__version__, "scipy": scipy.__version__,
-            "numba": numba.__version__, "sympy": sympy.__version__, "cvxpy": cvxpy.__version__,
+            "fenchel": __version__,
+            "python": platform.python_version(),
+            **{name: version(name) for name in ("numpy", "scipy", "numba", "sympy", "cvxpy", "clarabel")},
         },
         sample=SampleView(
             positions=assembly.x,
@@ -171,10 +168,12 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
     parts = []
     if own:
         parts.append(
-            f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % at half the tolerance and half the step."
+            f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % "
+            "at half the tolerance and half the step."
         )
     if rigid:
         parts.append(
-            f"With rigid grains the same sample shows {min(rigid):.3g} to {max(rigid):.3g} MPa: that stiffness is an artefact of sweeps and step, not of the sample."
+            f"With rigid grains the same sample shows {min(rigid):.3g} to {max(rigid):.3g} MPa: "
+            "that stiffness is an artefact of sweeps and step, not of the sample."
         )
     return " ".join(parts)
