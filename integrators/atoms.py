@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Add, Dummy, Expr, Mul, Poly, PolynomialError, S, expand
+from sympy import Add, Dummy, Expr, Float, Mul, Poly, PolynomialError, expand
 
 from ..errors import DeclarationError
 from ..potentials import Law
@@ -54,7 +54,7 @@ class _Frame:
     size: int
     table: Mapping[Any, Any]
 
-    def number(self, expression: Expr) -> float:
+    def number(self, expression: Any) -> float:
         return float(expression.xreplace(dict(self.table)).evalf(17))
 
     def tensor(self, tensor: SymmetricTensor) -> tuple[np.ndarray, np.ndarray]:
@@ -99,7 +99,7 @@ def energy_atoms(law: Law, values: Mapping[str, float]) -> ConvexAtoms:
     rule = f"law '{law.name}', psi"
     layout, size = state_layout(law)
     places: dict[Any, int] = {law.observable: 0, **{v: 6 + layout[v.name][0] for v in law.internal}}
-    frame = _Frame(places, size + 6, {p: S(values[p.name]) for p in law.parameters})
+    frame = _Frame(places, size + 6, {p: Float(values[p.name]) for p in law.parameters})
     n = size + 6
     hessian, linear, constant = np.zeros((n, n)), np.zeros(n), 0.0
     positive, spectral = [], []
@@ -157,7 +157,7 @@ def flow_atoms(law: Law, values: Mapping[str, float]) -> FlowAtoms:
     """Every f_j taken apart; `DeclarationError` names the term that has no conic form."""
     layout, size = state_layout(law)
     places = {force: layout[v.name][0] for v, force in law.forces.items()}
-    frame = _Frame(places, size, {p: S(values[p.name]) for p in law.parameters})
+    frame = _Frame(places, size, {p: Float(values[p.name]) for p in law.parameters})
     linear, norms, limits = [], [], []
     for j, function in enumerate(law.surfaces):
         rule = f"law '{law.name}', inequality {j + 1} of phi_star"

@@ -12,6 +12,8 @@ The consistent tangent is c₀ 𝕀 + c₁ I⊗I + c₂ n⊗n + c₃ (n⊗I + I�
 
 from __future__ import annotations
 
+from typing import Any
+
 from sympy import Expr, S, Symbol
 
 from ..potentials import Law
@@ -47,7 +49,7 @@ def closed_module(law: Law) -> str:
     constants: dict[Expr, str] = {}
     point, uses_p = _point(law, moduli, cone, constants)
     energy, uses_e = _energy(law, constants)
-    layout, size = state_layout(law)
+    _, size = state_layout(law)
     rows = 2 + 4 * max(uses_p[1], uses_e[1]) + 2
     imports = sorted(uses_p[0] | uses_e[0] | ({"norm6"} if cone else set()))
     names = ", ".join(p.name for p in law.parameters)
@@ -97,7 +99,9 @@ def stability_list(law: Law, moduli: Moduli) -> list[tuple[str, Expr]]:
         *((x.name, row[k]) for k, (x, row) in enumerate(zip(internal_tensors(law), moduli.tensors, strict=True))),
     ]:
         zero = dict.fromkeys((*operator.c0.atoms(Step), *operator.c1.atoms(Step)), S.Zero)
-        for expression in (operator.c0.xreplace(zero), operator.c0.xreplace(zero) + 3 * operator.c1.xreplace(zero)):
+        c0: Any = operator.c0.xreplace(zero)
+        c1: Any = operator.c1.xreplace(zero)
+        for expression in (c0, c0 + 3 * c1):
             if is_constant(expression):
                 found.append((name, expression))
         found += [(name, weight) for weight, _ in operator.spectral if is_constant(weight)]
@@ -177,7 +181,7 @@ def _projection(law: Law, cone: ConeStructure, constants: dict[Expr, str], final
     """Trial state, region and new internal variables."""
     writer = Writer(constants)
     trial = {law.forces[v]: law.force_laws[v] for v in law.internal if v in law.forces}
-    surface = law.surfaces[0].xreplace(trial)
+    surface: Any = law.surfaces[0].xreplace(trial)
     has_norm = cone.a != 0
     lines = _views(law, "old_")
     if has_norm:

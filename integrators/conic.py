@@ -82,7 +82,7 @@ class ConicStep:
                     # a solution above the tolerance is announced by its status; the next tolerance is tried then
                     warnings.simplefilter("ignore", UserWarning)
                     self.problem.solve(solver=cvxpy.CLARABEL, **settings)
-            except cvxpy.error.SolverError as error:
+            except cvxpy.SolverError as error:
                 reason = str(error).splitlines()[0]
                 continue
             reason, reached = f"status '{self.problem.status}'", tolerance

@@ -70,108 +70,94 @@ def drive_(base_, goal_, z_, v_, symmetric_, eps_, old_, out_eps_, out_sig_, out
     work_ = np.zeros((WORK_ROWS, 12))
     steps_, size_ = base_.shape[0], z_.shape[1]
     new_ = np.zeros(out_state_.shape[1])
-    sig_, tangent_, elastic_ = np.zeros(6), np.zeros((6, 6)), np.zeros((6, 6))
-    trial_ = np.zeros(6)
+    sig_, tangent_ = np.zeros(6), np.zeros((6, 6))
+    trial_, start_ = np.zeros(6), np.zeros(6)
     residual_, step_, matrix_ = np.zeros(6), np.zeros(6), np.zeros((6, 6))
-    point_(eps_, old_, new_, sig_, elastic_, True, work_, c_)
-    stiff_ = 0.0
-    for i_ in range(6):
-        stiff_ = max(stiff_, abs(elastic_[i_, i_]))
-    total_ = 0.0
-    highest_ = 0.0
+    stiff_, total_, highest_, lost_ = 0.0, 0.0, 0.0, 0.0
     for n_ in range(steps_):
-        # the prescribed part of the strain: its increment is put on first, unknown components keep their last value
+        # the prescribed part of the strain is put on at once; unknown components begin at their last value
         for i_ in range(6):
             trial_[i_] = base_[n_, i_]
         for k_ in range(size_):
-            part_ = 0.0
+            part_, along_ = 0.0, 0.0
             for i_ in range(6):
                 part_ += z_[i_, k_]*z_[i_, k_]
-            along_ = 0.0
-            for i_ in range(6):
                 along_ += z_[i_, k_]*(eps_[i_] - base_[n_, i_])
-            step_[k_] = along_/part_
-        for k_ in range(size_):
             for i_ in range(6):
-                trial_[i_] += z_[i_, k_]*step_[k_]
-        for i_ in range(6):
-            eps_[i_] = trial_[i_]
-        status_, lost_ = point_(eps_, old_, new_, sig_, tangent_, True, work_, c_)
+                trial_[i_] += z_[i_, k_]*along_/part_
         done_ = False
-        size_now_, scale_ = 0.0, 0.0
-        for turn_ in range(limit_):
-            size_now_ = 0.0
-            scale_ = 0.0
-            strain_ = 0.0
+        turns_, cut_ = 0, 0
+        level_, before_, slope_ = 0.0, -1.0, 0.0
+        low_, up_, factor_ = 0.0, -1.0, 1.0
+        # one evaluation per pass; `before_` < 0 marks the first one of a step, which is always taken
+        while turns_ < limit_:
+            status_, lost_ = point_(trial_, old_, new_, sig_, tangent_, True, work_, c_)
+            scale_, strain_, now_, along_ = 0.0, 0.0, 0.0, 0.0
             for i_ in range(6):
                 scale_ = max(scale_, abs(sig_[i_]))
-                strain_ = max(strain_, abs(eps_[i_]))
+                strain_ = max(strain_, abs(trial_[i_]))
+                stiff_ = max(stiff_, abs(tangent_[i_, i_]))
             for k_ in range(size_):
                 value_ = -goal_[n_, k_]
                 scale_ = max(scale_, abs(goal_[n_, k_]))
                 for i_ in range(6):
                     value_ += v_[k_, i_]*sig_[i_]
                 residual_[k_] = value_
-                size_now_ = max(size_now_, abs(value_))
-            if status_ != 0:
-                break
-            # rounding of stiffness times strain bounds what can be reached, but a runaway strain must not excuse a residual
-            level_ = max(scale_, 1e-3*highest_)
-            if size_now_ <= max(tolerance_*level_, min(4e-15*stiff_*strain_, 1e-8*level_)):
-                done_ = True
-                highest_ = max(highest_, scale_)
-                break
-            for k_ in range(size_):
-                for l_ in range(size_):
-                    value_ = 0.0
-                    for i_ in range(6):
-                        if v_[k_, i_] != 0.0:
-                            for j_ in range(6):
-                                value_ += v_[k_, i_]*tangent_[i_, j_]*z_[j_, l_]
-                    matrix_[k_, l_] = value_
-                step_[k_] = -residual_[k_]
-            solve_(matrix_, step_, size_, 1e-13*stiff_)
-            slope_ = 0.0
-            for k_ in range(size_):
-                slope_ += residual_[k_]*step_[k_]
-            # line search: on the slope of the convex incremental energy where the system is its gradient, else on the residual
-            low_, up_, factor_ = 0.0, -1.0, 1.0
-            for cut_ in range(30):
-                for i_ in range(6):
-                    value_ = eps_[i_]
-                    for k_ in range(size_):
-                        value_ += factor_*z_[i_, k_]*step_[k_]
-                    trial_[i_] = value_
-                status_, lost_ = point_(trial_, old_, new_, sig_, tangent_, True, work_, c_)
-                now_, along_ = 0.0, 0.0
-                for k_ in range(size_):
-                    value_ = -goal_[n_, k_]
-                    for i_ in range(6):
-                        value_ += v_[k_, i_]*sig_[i_]
-                    now_ = max(now_, abs(value_))
-                    along_ += value_*step_[k_]
-                if status_ == 0 and now_ < 0.5*size_now_:
-                    break
+                now_ = max(now_, abs(value_))
+                along_ += value_*step_[k_]
+            taken_ = before_ < 0.0 or (status_ == 0 and now_ < 0.5*before_)
+            if not taken_:
+                # line search: on the slope of the convex incremental energy where the system is its gradient, else on the residual
+                cut_ += 1
                 if symmetric_ and slope_ < 0.0:
-                    if status_ == 0 and abs(along_) <= 0.8*abs(slope_):
-                        break
-                    if status_ == 0 and along_ < 0.0:
-                        if up_ < 0.0:
-                            break
-                        low_ = factor_
-                    else:
-                        up_ = factor_
-                    factor_ = 0.5*(low_ + up_)
+                    taken_ = status_ == 0 and (abs(along_) <= 0.8*abs(slope_) or (along_ < 0.0 and up_ < 0.0))
+                    if not taken_:
+                        if status_ == 0 and along_ < 0.0:
+                            low_ = factor_
+                        else:
+                            up_ = factor_
+                        factor_ = 0.5*(low_ + up_)
                 else:
-                    if status_ == 0 and now_ < size_now_:
-                        break
-                    if cut_ > 8:
-                        break
-                    factor_ *= 0.5
+                    taken_ = (status_ == 0 and now_ < before_) or cut_ > 8
+                    if not taken_:
+                        factor_ *= 0.5
+                taken_ = taken_ or cut_ > 30
+            if taken_:
+                turns_ += 1
+                for i_ in range(6):
+                    start_[i_] = trial_[i_]
+                if status_ != 0:
+                    break
+                # rounding of stiffness times strain bounds what can be reached, but a runaway strain must not excuse a residual
+                level_ = max(scale_, 1e-3*highest_)
+                before_ = now_
+                if now_ <= max(tolerance_*level_, min(4e-15*stiff_*strain_, 1e-8*level_)):
+                    done_ = True
+                    highest_ = max(highest_, scale_)
+                    break
+                for k_ in range(size_):
+                    for l_ in range(size_):
+                        value_ = 0.0
+                        for i_ in range(6):
+                            if v_[k_, i_] != 0.0:
+                                for j_ in range(6):
+                                    value_ += v_[k_, i_]*tangent_[i_, j_]*z_[j_, l_]
+                        matrix_[k_, l_] = value_
+                    step_[k_] = -residual_[k_]
+                solve_(matrix_, step_, size_, 1e-13*stiff_)
+                slope_ = 0.0
+                for k_ in range(size_):
+                    slope_ += residual_[k_]*step_[k_]
+                low_, up_, factor_, cut_ = 0.0, -1.0, 1.0, 0
             for i_ in range(6):
-                eps_[i_] = trial_[i_]
+                value_ = start_[i_]
+                for k_ in range(size_):
+                    value_ += factor_*z_[i_, k_]*step_[k_]
+                trial_[i_] = value_
         if not done_:
-            return n_, size_now_, scale_
+            return n_, before_, level_
+        for i_ in range(6):
+            eps_[i_] = start_[i_]
         total_ += lost_
         for i_ in range(6):
             out_eps_[n_, i_] = eps_[i_]

@@ -126,7 +126,8 @@ def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace:
     z = np.array(columns).T.reshape(6, count)
     v = np.array(rows).reshape(count, 6)
     goal_rows = np.array(goal).T.reshape(len(goals), count)
-    return _Plan(*(np.ascontiguousarray(a) for a in (base, goal_rows, z, v)), symmetric)
+    arrays = [np.ascontiguousarray(a) for a in (base, goal_rows, z, v)]
+    return _Plan(arrays[0], arrays[1], arrays[2], arrays[3], symmetric)
 
 
 def _run(

@@ -19,6 +19,7 @@ The rest of the energy, a function of ε alone, may be anything with a gradient 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from sympy import Dummy, Expr, S
 
@@ -112,8 +113,10 @@ def find_cone(law: Law, moduli: Moduli) -> ConeStructure:
     function = law.surfaces[0]
     leaves = invariants_of(function)
     dummies = [Dummy(f"l{i}", real=True) for i in range(len(leaves))]
-    opened = function.xreplace(dict(zip(leaves, dummies, strict=True)))
-    dev_weights, trace_weights, a = [S.Zero] * len(tensors), [S.Zero] * len(tensors), S.Zero
+    opened: Any = function.xreplace(dict(zip(leaves, dummies, strict=True)))
+    dev_weights: list[Expr] = [S.Zero] * len(tensors)
+    trace_weights: list[Expr] = [S.Zero] * len(tensors)
+    a: Expr = S.Zero
     for dummy, leaf in zip(dummies, leaves, strict=True):
         slope = opened.diff(dummy)
         if slope.atoms(Dummy) or not is_constant(slope):
@@ -143,7 +146,7 @@ def find_cone(law: Law, moduli: Moduli) -> ConeStructure:
 def _force_weights(
     law: Law, tensor: SymmetricTensor, tensors: tuple[TensorSymbol, ...], deviatoric: bool
 ) -> list[Expr]:
-    weights = [S.Zero] * len(tensors)
+    weights: list[Expr] = [S.Zero] * len(tensors)
     place = {law.forces[x]: k for k, x in enumerate(tensors) if x in law.forces}
     for atom, coefficient in tensor.terms().items():
         base = atom.args[0] if isinstance(atom, Deviator) else atom

@@ -7,6 +7,7 @@ are loops over six Mandel components. Names of the generator end with an undersc
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from sympy import Expr, S, Symbol
 
@@ -46,7 +47,7 @@ class Writer:
         """Name of a coefficient that depends on parameters only."""
         return self.constants.setdefault(expression, f"k{len(self.constants)}_")
 
-    def _hoisted(self, expression: Expr) -> Expr:
+    def _hoisted(self, expression: Any) -> Any:
         local = set(self.leaves.values())
         if is_constant(expression) and not expression.free_symbols & local:
             if expression.is_Number:

@@ -54,7 +54,7 @@ def check(law: Law, values: Mapping[str, Any]) -> AdmissibilityReport:
         if not p.lower <= float(number) <= p.upper:
             refuted.append(f"{p.name} = {float(number):g} lies outside [{p.lower:g}, {p.upper:g}]")
     for text, expression in conditions:
-        value = expression.xreplace(table)
+        value: Any = expression.xreplace(table)
         if value.is_number and not (value.is_finite and value.is_real):
             refuted.append(f"{text} is not finite for the values given")
         elif value.is_number:
@@ -102,7 +102,7 @@ def _flow(law: Law, conditions: list[tuple[str, Expr]], reasons: list[str]) -> l
         forces = sorted(function.atoms(ForceScalar), key=str)
         generators: list[Expr] = [*leaves, *forces]
         dummies = [Dummy(f"g{i}", real=True) for i in range(len(generators))]
-        opened = function.xreplace(dict(zip(generators, dummies, strict=True)))
+        opened: Any = function.xreplace(dict(zip(generators, dummies, strict=True)))
         for dummy, generator in zip(dummies, generators, strict=True):
             slope = opened.diff(dummy)
             if (

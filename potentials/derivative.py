@@ -12,6 +12,7 @@ are taken by sympy with the invariants replaced by dummies.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 from sympy import Dummy, Expr, Rational, S, default_sort_key, sympify
 
@@ -60,7 +61,7 @@ def linear_part(tensor: SymmetricTensor, variable: TensorSymbol) -> tuple[Expr, 
 
 
 def _apply(part: tuple[Expr, Expr], tensor: SymmetricTensor) -> SymmetricTensor:
-    return part[0] * tensor + part[1] * dev(tensor)
+    return tensor * part[0] + dev(tensor) * part[1]
 
 
 def _leaf_gradient(leaf: Invariant, x: TensorSymbol) -> SymmetricTensor:
@@ -68,7 +69,7 @@ def _leaf_gradient(leaf: Invariant, x: TensorSymbol) -> SymmetricTensor:
     assert isinstance(first, SymmetricTensor)
     part = linear_part(first, x)
     if isinstance(leaf, TraceLeaf):
-        return part[0] * identity
+        return identity * part[0]
     if isinstance(leaf, InnerLeaf):
         second = leaf.args[1]
         assert isinstance(second, SymmetricTensor)
@@ -117,7 +118,7 @@ def _leaf_second(leaf: Invariant, x: TensorSymbol, y: TensorSymbol, weight: Expr
     raise DeclarationError(f"no second derivative is known for {leaf}")
 
 
-def _opened(expression: Expr) -> tuple[Expr, list[Invariant], list[Dummy]]:
+def _opened(expression: Any) -> tuple[Any, list[Invariant], list[Dummy]]:
     leaves = invariants_of(expression)
     dummies = [Dummy(f"l{i}", real=True) for i in range(len(leaves))]
     return expression.xreplace(dict(zip(leaves, dummies, strict=True))), leaves, dummies

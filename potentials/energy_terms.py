@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from sympy import Add, Dummy, Expr, Poly, PolynomialError, S
 
@@ -45,7 +46,7 @@ def sort_energy(law: Law) -> EnergyTerms:
     return found
 
 
-def _sort(found: EnergyTerms, weight: Expr, factors: list[Expr]) -> None:
+def _sort(found: EnergyTerms, weight: Any, factors: list[Expr]) -> None:
     if weight == 0:
         return
     first = factors[0] if factors else None

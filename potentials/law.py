@@ -152,7 +152,7 @@ class Law:
             if not isinstance(new, Expr):
                 raise DeclarationError(f"parameter '{key}' must be replaced by a scalar expression")
             table[known[key]] = new
-        star = None if self.phi_star is None else Indicator(tuple(f.xreplace(table) for f in self.surfaces))
+        star = None if self.phi_star is None else Indicator(tuple(f.xreplace(table) for f in self.surfaces))  # type: ignore[arg-type]
         return replace(self, name=name or self.name, psi=self.psi.xreplace(table), phi_star=star)
 
     # -- what is derived elsewhere ---------------------------------------------------------------------------------------------

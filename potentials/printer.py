@@ -60,6 +60,6 @@ def number_code(expression: Expr) -> str:
         if function.is_number and not function.is_finite:
             raise DeclarationError(f"the expression {expression} holds {function}")
     try:
-        return _NumberPrinter().doprint(expression)
+        return str(_NumberPrinter().doprint(expression))
     except Exception as error:
         raise DeclarationError(f"no code can be written for {expression}: {str(error).splitlines()[0]}") from None

@@ -100,12 +100,12 @@ class PositivePart(Function):
     is_nonnegative = True
 
     @classmethod
-    def eval(cls, x: Expr) -> Expr | None:
+    def eval(cls, x: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         if x.is_nonnegative:
             return x
         return S.Zero if x.is_nonpositive else None
 
-    def fdiff(self, argindex: int = 1) -> Expr:
+    def fdiff(self, argindex: int = 1) -> Any:
         return Step(self.args[0])
 
     def _sympystr(self, printer: Any) -> str:
@@ -123,7 +123,7 @@ class Step(Function):
     is_nonnegative = True
 
     @classmethod
-    def eval(cls, x: Expr) -> Expr | None:
+    def eval(cls, x: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
         if x.is_positive:
             return S.One
         return S.Zero if x.is_nonpositive else None
@@ -131,8 +131,8 @@ class Step(Function):
     def fdiff(self, argindex: int = 1) -> Expr:
         return S.Zero
 
-    def _eval_power(self, exponent: Expr) -> Expr | None:
-        return self if exponent.is_positive else None
+    def _eval_power(self, expt: Expr) -> Expr | None:
+        return self if expt.is_positive else None
 
     def _sympystr(self, printer: Any) -> str:
         return f"step({printer._print(self.args[0])})"
@@ -142,7 +142,7 @@ class Step(Function):
         return body if exp is None else rf"{body}^{{{exp}}}"
 
 
-def tidy(expression: Expr) -> Expr:
+def tidy(expression: Any) -> Any:
     """Write ⟨x⟩ H(x) as ⟨x⟩."""
     if not expression.has(Step):
         return expression

@@ -31,7 +31,7 @@ class IsotropicStiffness:
 
     def stress(self, strain: SymmetricTensor) -> SymmetricTensor:
         """𝕂e."""
-        return self.lam * tr(strain) * identity + 2 * self.mu * strain
+        return identity * (self.lam * tr(strain)) + strain * (2 * self.mu)
 
 
 def lame(E: Any, nu: Any) -> tuple[Expr, Expr]:

@@ -107,10 +107,11 @@ def _product(force: tuple[str, str], variable: Variable) -> tuple[str, str]:
 
 
 def _force_name(law: Law, variable: Variable, irreversible: TensorSymbol | None) -> tuple[str, str]:
-    if variable in law.forces:
-        base = _name(law.forces[variable])
-    else:
-        base = (f"A_{variable.name}", rf"A_{{{latex_name(variable.name)}}}")
+    base = (
+        _name(law.forces[variable])
+        if variable in law.forces
+        else (f"A_{variable.name}", rf"A_{{{latex_name(variable.name)}}}")
+    )
     return (f"{base[0]}_r", rf"{base[1]}^{{r}}") if variable == irreversible else base
 
 
@@ -282,7 +283,8 @@ def _complementary(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         rows.append(
             Row(
                 "rate form",
-                f"({', '.join(f for f, _ in forces)}) in dphi, phi = sup over f <= 0 of the products of forces and ({', '.join(r for r, _ in rates)})",
+                f"({', '.join(f for f, _ in forces)}) in dphi, phi = sup over f <= 0 of the products of forces and "
+                f"({', '.join(r for r, _ in rates)})",
                 rf"({', '.join(f for _, f in forces)}) \in \partial\varphi,\ \varphi = \sup_{{f \leq 0}} \sum A_m \cdot \dot\alpha_m",
             )
         )

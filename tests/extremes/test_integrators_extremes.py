@@ -84,7 +84,7 @@ def test_ends_of_the_parameters(change):
 
 @pytest.mark.parametrize("nu", [0.5, -1.0])
 def test_infinite_moduli_are_refused(nu):
-    with pytest.raises(InputError, match="infinite|strictly"):
+    with pytest.raises(InputError, match="infinite"):
         sand.compile()(STRAINS, None, **SAND | {"nu_s": nu})
 
 
