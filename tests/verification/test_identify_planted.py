@@ -41,7 +41,7 @@ SEVEN = ("E_s", "E_w", "nu", "theta_f", "C_0", "H_k", "H_i")
 
 def simulate(parameters, pressure, axial_strain):
     """The independent law as the route of the fit."""
-    strain, sand, wire = planted_law.triaxial(Planted(**parameters.to_json()), pressure, axial_strain)
+    strain, sand, wire = planted_law.triaxial(Planted(**parameters.to_json()), float(np.mean(pressure)), axial_strain)
     return Replay(strain=strain, stress=sand + wire, wire=wire)
 
 

@@ -117,7 +117,7 @@ def test_the_exported_law_replays_the_identified_one(found, folder):
         targets[:, 2], targets[:, 0], targets[:, 1] = rows[:, 1], rows[:, 2], rows[:, 3]
         assert not targets[0].any()
         run = drive_arrays(update, [True, True, False, True, True, True], targets, values)
-        own = replay(found.law, level, np.concatenate([[0.0], rows[2:, 1] - rows[1, 1]]))
+        own = replay(found.law, -rows[1:, 2], np.concatenate([[0.0], rows[2:, 1] - rows[1, 1]]))
         assert np.abs(run.sig[1:] - own.stress).max() < 1e-6 * level
         assert np.abs(run.eps[1:] - run.eps[1] - own.strain).max() < 1e-9
         assert np.abs(run.sig[1] + level * np.array([1, 1, 1, 0, 0, 0])).max() < 1e-6 * level

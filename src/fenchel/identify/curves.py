@@ -69,6 +69,16 @@ class Curves:
         return lateral(self.strain)
 
     @property
+    def lateral_pressure(self) -> Array:
+        """What the sphere is confined by [Pa], positive: the mean pressure at the start, then −σ_r of the whole as it moves.
+
+        In a box of few grains the sphere carries more than the walls (next to a wall a layer of half a grain carries nothing), so
+        that the confining pressure of the test is not that of the sphere.
+        """
+        side = -lateral(self.total)
+        return pressure(self.total[0]) + side - side[0]
+
+    @property
     def volume_strain(self) -> Array:
         """tr ε of the sand [-], positive for dilation."""
         return self.strain[:, :3].sum(axis=1)

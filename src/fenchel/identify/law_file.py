@@ -46,7 +46,7 @@ _HEAD = '''"""Law identified from {tests}.
 
 Drive it:  fenchel drive law.py:law path_{first}kPa.csv --parameters parameters_{first}kPa.toml
 
-P_0 is the confining pressure at which the wires were switched on (natural there); 0 for wires natural in the virgin state.
+P_0 is the pressure of the sphere at which the wires were switched on (natural there); 0 for wires natural in the virgin state.
 """
 
 from sympy import sqrt, tan
@@ -100,17 +100,20 @@ def law_text(found: Identification) -> str:
 
 
 def parameters_text(parameters: LawParameters, pressure: float) -> str:
-    """Parameter file (TOML) of `law.py` for a test at one confining pressure [Pa]."""
+    """Parameter file (TOML) of `law.py` for a test that starts at one pressure of the sphere [Pa]."""
     rows = [f"{name} = {value!r}  # {_NOTES[name][0]}" for name, value in parameters.to_json().items()]
     return "\n".join([*rows, f"P_0 = {float(pressure)!r}  # Pa, wires natural at this pressure"]) + "\n"
 
 
-def path_rows(parameters: LawParameters, pressure: float, axial_strain: np.ndarray) -> str:
-    """Path file (CSV) from the virgin state: isotropic compression to `pressure`, then the axial strains of the test."""
-    start = pressure / (3.0 * parameters.bulk)
+def path_rows(parameters: LawParameters, pressure: np.ndarray, axial_strain: np.ndarray) -> str:
+    """Path file (CSV) from the virgin state: isotropic compression to the first of `pressure`, shape (n,), then the test.
+
+    `pressure` [Pa] is the lateral pressure of the sphere at every frame, `axial_strain` its axial strain from the start of the test.
+    """
+    start = pressure[0] / (3.0 * parameters.bulk)
     rows = ["t,eps_zz,sig_xx,sig_yy", "0,0,0,0"]
-    for k, strain in enumerate(axial_strain - axial_strain[0]):
-        rows.append(f"{k + 1},{strain - start:.12e},{-pressure:.9e},{-pressure:.9e}")
+    for k, (strain, side) in enumerate(zip(axial_strain - axial_strain[0], pressure, strict=True)):
+        rows.append(f"{k + 1},{strain - start:.12e},{-side:.9e},{-side:.9e}")
     return "\n".join(rows) + "\n"
 
 
@@ -122,8 +125,8 @@ def write_law(found: Identification, directory: Path) -> list[Path]:
         if test is None:
             continue
         tag = f"{level / 1e3:g}kPa"
-        out[directory / f"path_{tag}.csv"] = path_rows(found.law, level, test.axial_strain)
-        out[directory / f"parameters_{tag}.toml"] = parameters_text(found.law, level)
+        out[directory / f"path_{tag}.csv"] = path_rows(found.law, test.lateral_pressure, test.axial_strain)
+        out[directory / f"parameters_{tag}.toml"] = parameters_text(found.law, float(test.lateral_pressure[0]))
     for path, text in out.items():
         path.write_text(text, encoding="utf-8")
     return list(out)

@@ -37,6 +37,7 @@ class Prediction:
     volume_end_law: float  # the same of the law
     leg: NDArray[np.int64]
     axial_strain: Array
+    lateral_pressure: Array  # of the sphere [Pa], the path of the replay
     q: Array
     q_law: Array
     q_sand: Array  # of the sand, whole [Pa]
@@ -58,7 +59,7 @@ def predict(
     test: Curves, parameters: LawParameters, simulate: Simulate, *, seed: int, linked: bool, held_out: bool
 ) -> Prediction:
     """Replay one test with given parameters and compare. Raises `ConvergenceError` if the law does not converge."""
-    run = simulate(parameters, test.pressure, test.axial_strain - test.axial_strain[0])
+    run = simulate(parameters, test.lateral_pressure, test.axial_strain - test.axial_strain[0])
     q_law = deviator(run.stress)
     q_law = q_law - q_law[0]
     side, side_law = test.lateral_strain - test.lateral_strain[0], lateral(run.strain)
@@ -78,6 +79,7 @@ def predict(
         volume_end_law=float(volume_law[end]),
         leg=test.leg,
         axial_strain=test.axial_strain,
+        lateral_pressure=test.lateral_pressure,
         q=test.q,
         q_law=q_law,
         q_sand=deviator(test.sand),
