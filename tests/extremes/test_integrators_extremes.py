@@ -122,6 +122,8 @@ def test_eigen_decomposition_on_awkward_matrices():
             )
     sets.append(np.ones((60, 6)) * [1, 1, 1, 0, 0, 0] + 3e-16 * rng.normal(size=(60, 6)))
     sets.append(np.diag([1.0, 1e-6, 1e-12, 0, 0, 0]))
+    spherical = np.array([1.0, 1, 1, 0, 0, 0])
+    sets += [spherical[None], -7.3 * spherical[None], spherical + 1e-17 * np.eye(6)[:, [3, 4, 5, 0, 1, 2]]]
     sets += [1e150 * sets[0], 1e-150 * sets[0], np.zeros((1, 6))]
     out = np.empty(12)
     for t in np.concatenate(sets):

@@ -106,6 +106,10 @@ def test_undrained_and_isobaric_control(tmp_path):
     exact[:, 0] = exact[:, 1] = -exact[:, 2] / 2
     forced = drive_arrays(sand.compile(), [False] * 6, exact, values)
     assert np.abs(forced.sig - undrained.sig).max() <= 1e-8 * 2842
+    file.write_text("t,eps_zz,sig_xx,eps_v\n0,0,0,0\n1,0,-5e4,-1e-3\n2,-2e-3,-5e4,-1e-3\n3,-9e-3,-4e4,-2e-3\n")
+    one = drive(sand, file, values)
+    assert one.sig[1:, 0] == pytest.approx([-5e4, -5e4, -4e4], rel=1e-10)
+    assert one.eps[:, :3].sum(axis=1) == pytest.approx([0, -1e-3, -1e-3, -2e-3], abs=1e-17)
     file.write_text("t,eps_zz,p\n0,0,0\n" + "\n".join(f"{i},{-1e-4 * i},5e4" for i in range(1, 40)) + "\n")
     isobaric = drive(sand, file, values)
     assert -isobaric.sig[1:, :3].mean(axis=1) == pytest.approx(5e4, rel=1e-10)
