@@ -51,7 +51,7 @@ class ContactProgram:
             np.concatenate([np.sqrt(self.inverse_mass)[:, None] * self.h.T, np.diag(np.sqrt(self.compliance))]) * scale
         )
         y = cp.Variable(len(self.b))
-        bounds = [y[self.unilateral] >= 0.0] if self.unilateral.any() else []
+        bounds: list[cp.Constraint] = [y[self.unilateral] >= 0.0] if self.unilateral.any() else []
         problem = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(factor @ y) + (scale * self.b / size) @ y), bounds)
         # hyperstatic rigid packings have no unique impulse: the tightest tolerance may be out of reach
         for tolerance in (1e-12, 1e-10, 1e-8):

@@ -118,9 +118,9 @@ def densify(
     x[n:] = lay_wires(rng, wire_count, beads, spacing, half).reshape(-1, 3)
     wire = np.concatenate([np.full(n, -1), np.repeat(np.arange(wire_count), beads)]).astype(np.int64)
     rank = np.concatenate([np.zeros(n), np.tile(np.arange(beads), wire_count)]).astype(np.int64)
-    mean_mass = density * 4.0 / 3.0 * np.pi * np.mean(grain_radius**3)
+    mean_mass = float(density * 4.0 / 3.0 * np.pi * np.mean(grain_radius**3))
     mass = np.concatenate([density * 4.0 / 3.0 * np.pi * grain_radius**3, np.full(bead_count, mean_mass)])
-    assembly = Assembly.of_spheres(x, radius, mass, half, wire=wire, rank=rank)
+    assembly = Assembly.of_spheres(x, radius, mass.astype(np.float64), half, wire=wire, rank=rank)
     x = assembly.x
     for scale in np.linspace(0.4, 1.0, stages):
         _relax(assembly, scale * radius, spacing, passes, 0.0)

@@ -115,4 +115,4 @@ def _best_fit_strain(sums: Array) -> Array:
     xx = sums[:, 7:16].reshape(frames, 3, 3) - sx[:, :, None] * sx[:, None, :] / count[:, None, None]
     ux = sums[:, 16:25].reshape(frames, 3, 3) - su[:, :, None] * sx[:, None, :] / count[:, None, None]
     gradient = np.swapaxes(np.linalg.solve(xx, np.swapaxes(ux, -1, -2)), -1, -2)
-    return mandel(gradient)
+    return mandel(np.asarray(gradient, dtype=np.float64))

@@ -104,7 +104,10 @@ class TriaxialTest:
         return float(walked / legs.sum())
 
     def advance(self) -> dict[str, float]:
-        """One step, returns its measures; a frame is stored at the start, every `frame_strain` (a quarter of it at first), and at the end of each leg."""
+        """One step, returns its measures.
+
+        A frame is stored at the start, every `frame_strain` (a quarter of it at first), and at the end of each leg.
+        """
         if self.steps == 0:
             # loose bodies still drift after the preparation: caught by links they would make a shock
             self.assembly.velocity[:] = 0.0
@@ -132,7 +135,9 @@ class TriaxialTest:
             self.leg += 1
         last = self.frames["axial_strain"][-1] if self.frames["axial_strain"] else np.inf
         # four times as dense where the sample is nearly elastic
-        spacing = 0.25 * self.frame_strain if leg == 0 and abs(self.strain) < 4.0 * self.frame_strain else self.frame_strain
+        spacing = (
+            0.25 * self.frame_strain if leg == 0 and abs(self.strain) < 4.0 * self.frame_strain else self.frame_strain
+        )
         if reached or not np.abs(self.strain - last) < spacing * (1.0 - 1e-9):
             self._store(measures, leg)
         return measures

@@ -79,7 +79,7 @@ def _leaf_gradient(leaf: Invariant, x: TensorSymbol) -> SymmetricTensor:
     if isinstance(leaf, NormLeaf):
         return _apply(part, first) / leaf
     if isinstance(leaf, PositiveSquareLeaf):
-        return 2 * _apply(part, PositiveTensor(first))
+        return _apply(part, PositiveTensor(first)) * 2
     raise DeclarationError(f"no derivative is known for {leaf}")
 
 

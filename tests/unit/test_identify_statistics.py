@@ -6,8 +6,8 @@ import json
 
 import numpy as np
 import pytest
-from fenchel.dem.record import PhaseHistory
 
+from fenchel.dem.record import PhaseHistory
 from fenchel.errors import InputError
 from fenchel.identify import (
     IdentifyOptions,

@@ -183,8 +183,14 @@ def test_prestressed_wires_pull_before_the_test() -> None:
             stage.advance()
     assert np.mean(assembly.link_impulse > 0.0) > 0.1
     test = TriaxialTest(
-        assembly, material_of(GRAINS, wires), Solver(), pressure=PRESSURE, density=GRAINS.density, strain_path=(0.0, -1e-4), prestressed=True
-    )  # fmt: skip
+        assembly,
+        material_of(GRAINS, wires),
+        Solver(),
+        pressure=PRESSURE,
+        density=GRAINS.density,
+        strain_path=(0.0, -1e-4),
+        prestressed=True,
+    )
     while not test.done:
         test.advance()
     history = test.record(seed=3, settings={}).history()

@@ -87,11 +87,10 @@ def natural_map(before: np.ndarray, free: np.ndarray, box_free: np.ndarray, rows
             h[:, 6 * body : 6 * body + 3] = sign * np.eye(3)
             h[:, 6 * body + 3 : 6 * body + 6] = -cross.T
         p = row[3:6]
-        law = (
-            lambda u, p=p, n=n, row=row: (  # noqa: E731
-                u + (row[9] + rows.cn * (p @ n)) * n + rows.ct * (p - (p @ n) * n - row[6:9])
-            )
-        )
+
+        def law(u: np.ndarray, p: np.ndarray = p, n: np.ndarray = n, row: np.ndarray = row) -> np.ndarray:
+            return u + (row[9] + rows.cn * (p @ n)) * n + rows.ct * (p - (p @ n) * n - row[6:9])
+
         blocks.append((h, p, n, row[12], row[10], law))
     for (i, axis, side), row in zip(rows.wall, rows.wall_row, strict=True):
         h = np.zeros((1, len(v)))

@@ -11,8 +11,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from fenchel.integrators import drive_arrays
-from fenchel.potentials import load_law
 
 from fenchel.errors import InputError, StorageError
 from fenchel.identify import (
@@ -27,6 +25,8 @@ from fenchel.identify import (
     series_of,
     write_report,
 )
+from fenchel.integrators import drive_arrays
+from fenchel.potentials import load_law
 
 _spec = importlib.util.spec_from_file_location("planted_law", Path(__file__).parents[1] / "planted_law.py")
 assert _spec is not None and _spec.loader is not None

@@ -88,7 +88,9 @@ class _Problem:
         self.evaluations += 1
         out = []
         for test in self.tests:
-            run = deviator(self.simulate(parameters, test.lateral_pressure, test.axial_strain - test.axial_strain[0]).stress)
+            run = deviator(
+                self.simulate(parameters, test.lateral_pressure, test.axial_strain - test.axial_strain[0]).stress
+            )
             if not np.all(np.isfinite(run)):
                 raise ConvergenceError(f"the law gives no finite stress at {test.pressure:g} Pa with {parameters}")
             out.append(run - run[0])
