@@ -1,8 +1,8 @@
 r"""Rows of the one-step problem: normals, gaps, warm impulses and diagonal blocks of the contacts that may close.
 
 Contact between spheres i < j: n from j to i, g = |x_i − x_j| − r_i − r_j, detected at the mid configuration. Rigid grains take the
-inelastic quasi-shock b = max(0, g)/h (penetration is not pushed back), compliant ones b = g/h with g signed and c = 1/(k h²): the
-force at the end of the step is then exactly −k g (implicit Euler, unconditionally stable).
+inelastic quasi-shock b = max(0, g)/h (penetration is not pushed back unless `signed`), compliant ones b = g/h with g signed and
+c = 1/(k h²): the force at the end of the step is then exactly −k g (implicit Euler, unconditionally stable).
 
 Columns of a contact row: n (3), p (3), p_t⁰ (3), b, 1/(W_n + c_n), 1/(W_t + c_t), μ, g, p_n⁰, candidate.
 Wall row: p, b, 1/(W_n + c_n), g, p⁰, candidate. Link row: n (3), tension impulse, β, 1/(W_n + c), c, tension of the step before.
@@ -37,6 +37,7 @@ def collect_contacts(
     ct: float,
     friction: float,
     bead_friction: float,
+    signed: bool,
 ) -> tuple[Ints, Array]:
     """Contacts of the candidate `pairs` with gap below `reach` [m]; `impulse`, shape (pair_count, 3), is the warm start."""
     total = pairs.shape[0]
@@ -77,7 +78,7 @@ def collect_contacts(
         row[m, 4] = pn * n1 + t1
         row[m, 5] = pn * n2 + t2
         row[m, 6], row[m, 7], row[m, 8] = t0, t1, t2
-        row[m, 9] = gap / step if cn > 0.0 else max(0.0, gap) / step
+        row[m, 9] = gap / step if signed else max(0.0, gap) / step
         row[m, 10] = 1.0 / (w + cn)
         row[m, 11] = 1.0 / (3.5 * w + ct)
         row[m, 12] = mu
@@ -109,6 +110,7 @@ def collect_walls(
     reach: float,
     step: float,
     cn: float,
+    signed: bool,
 ) -> tuple[Ints, Array]:
     """Contacts with the frictionless walls |x_a| = half_a among the candidate rows (body, axis, side)."""
     total = walls.shape[0]
@@ -123,7 +125,7 @@ def collect_walls(
             continue
         wall[m, 0], wall[m, 1], wall[m, 2] = i, axis, side
         row[m, 0] = impulse[k]
-        row[m, 1] = gap / step if cn > 0.0 else max(0.0, gap) / step
+        row[m, 1] = gap / step if signed else max(0.0, gap) / step
         row[m, 2] = 1.0 / (vel[i, 6] + box[axis, 1] + cn)
         row[m, 3] = gap
         row[m, 4] = impulse[k]

@@ -82,6 +82,7 @@ class IsotropicStage:
         share = min(1.0, (self.steps + 1) / self.ramp_steps) if self.ramp_steps else 1.0
         pressure = self.before + share * (self.pressure - self.before)
         a = self.assembly
+        self.simulation.push_out = self.steps < self.quench_steps
         if self.steps < self.quench_steps:  # overlaps of the start state are removed without flying apart
             a.velocity[:] = 0.0
             a.spin[:] = 0.0

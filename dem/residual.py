@@ -145,7 +145,7 @@ def assess(
         worst = max(worst, e)
         tt = t0 * t0 + t1 * t1 + t2 * t2
         size += pn * pn + tt
-        out[2] = max(out[2], -step * law_n)
+        out[2] = max(out[2], -contact[k, 13] - step * (un + cn * pn))
         work += p[0] * (u[0] + w[0]) + p[1] * (u[1] + w[1]) + p[2] * (u[2] + w[2])
         out[9] += 0.5 * (cn * pn * pn + ct * tt)
         out[10] -= t0 * l0 + t1 * l1 + t2 * l2
@@ -172,7 +172,7 @@ def assess(
         squared += e * e
         worst = max(worst, e * e)
         size += p * p
-        out[2] = max(out[2], -step * law_n)
+        out[2] = max(out[2], -wall_row[k, 3] - step * (un + cn * p))
         work += p * (un + wn)
         out[9] += 0.5 * cn * p * p
         out[11] += 0.5 * cn * (p - wall_row[k, 4]) ** 2

@@ -83,6 +83,7 @@ class Simulation:
         self.material = material
         self.solver = solver
         self.skin = 0.15 * assembly.grain_radius if skin is None else skin
+        self.push_out = False  # rigid overlaps are pushed out (g/h signed): only sensible while velocities are reset
         self.sweeps = 0  # of the last step
         self.change = 0.0  # relative impulse change of the last sweep
         self.total_sweeps = 0
@@ -143,6 +144,7 @@ class Simulation:
         cn = 1.0 / (law.normal_stiffness * step**2)
         ct = 1.0 / (law.tangential_stiffness * step**2)
         reach = 0.04 * a.grain_radius
+        signed = self.push_out or np.isfinite(law.normal_stiffness)
         pair, contact = collect_contacts(
             a.x,
             a.radius,
@@ -156,9 +158,10 @@ class Simulation:
             ct,
             law.friction,
             law.bead_friction,
+            signed,
         )
         wall, wall_row = collect_walls(
-            a.x, a.radius, before, a.half, box_before, a.walls, a.wall_impulse, reach, step, cn
+            a.x, a.radius, before, a.half, box_before, a.walls, a.wall_impulse, reach, step, cn, signed
         )
         wire = WIRE_LAWS[law.wire_law]
         link = a.links if law.links else a.links[:0]
@@ -212,8 +215,8 @@ class Simulation:
             raise ConvergenceError(
                 f"NLGS stopped after {self.sweeps} sweeps at a relative impulse change of {self.change:.2e} "
                 f"> {solver.tolerance:.0e} "
-                f"(natural map {measures[0]:.2e}, t = {a.time:.6g} s): raise solve.sweep_limit, reduce "
-                "the step, or give the grains a stiffness"
+                f"(natural map {measures[0]:.2e}, t = {a.time:.6g} s): raise solve.sweep_limit, loosen "
+                "solve.tolerance (rigid packings settle for 1e-4), or give the grains a stiffness"
             )
         a.elastic_energy = float(measures[9])
         a.velocity, a.spin = vel[:, 0:3].copy(), vel[:, 3:6].copy()

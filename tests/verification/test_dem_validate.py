@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+
 from fenchel.dem.homogenise import moments
 from fenchel.dem.preparation import make_sample, preparation
 from fenchel.dem.scene import Grains, Sample, SceneSolve

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import platform
 import time
 from collections.abc import Callable, Sequence
@@ -29,14 +30,21 @@ Task = Prepare | Test | Probe
 
 
 def run_study(
-    study_file: Path | str | None, directory: Path | str, *, jobs: int = 2, show: bool = True
+    study_file: Path | str | None,
+    directory: Path | str,
+    *,
+    jobs: int | None = None,
+    show: bool = True,
+    signs: str = "tension-positive",
 ) -> Identification:
     """Make the samples, test them, identify the law, write `report.html`, `report.json`, `law.py` and `runs/*.h5` into `directory`.
 
-    `study_file` None takes the study that fenchel carries. Raises `InputError` for a bad study, `ConvergenceError` when a step or a fit
-    does not converge, `StorageError` when a file cannot be written; finished runs stay and are taken up by the next call.
+    `study_file` None takes the study that fenchel carries; `jobs` None takes all cores; `signs` is for the axes of
+    the figures. Raises `InputError` for a bad study, `ConvergenceError` when a step or a fit does not converge, `StorageError` when a
+    file cannot be written; finished runs stay and are taken up by the next call.
     """
     directory = Path(directory)
+    jobs = os.cpu_count() or 1 if jobs is None else jobs
     if study_file is None:
         study, text = demo_study()
     else:
@@ -63,7 +71,7 @@ def run_study(
     identification = identify_law(_specimens(tests, records), study.options())
     clock["identification"] = time.perf_counter()
     info = _runs_info(study, prepare[0], tests, records, results[len(tests) :], clock)
-    write_report(identification, info, directory)
+    write_report(identification, info, directory, signs=signs)
     return identification
 
 
