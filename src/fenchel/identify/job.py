@@ -184,4 +184,6 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
             f"With rigid grains the same sample shows {min(rigid):.3g} to {max(rigid):.3g} MPa: "
             "that stiffness is an artefact of sweeps and step, not of the sample."
         )
+    if parts:
+        parts.append("Secants of wall stress over box strain; the E_s of the law is read inside the sphere, which is stiffer than the box.")
     return " ".join(parts)
