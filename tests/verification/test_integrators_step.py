@@ -99,21 +99,19 @@ def test_update_equals_the_conic_program(name, count):
     old = random_state(rng, law, count)
     update = law.compile()
     out = update(strains, old, **values)
-    apex = loose = 0
+    apex = 0
     for i in range(count):
         found = law.conic(strains[i], row(old, i), **values).solve()
-        # where the solver stops above 1e-9 it is the less exact of the two; that may happen once in a hundred states
-        loose += found.tolerance > 1e-9
-        bound = 1e-7 if found.tolerance <= 1e-9 else 1e-6
-        assert np.abs(found.stress - out.stress[i]).max() <= bound * values.get("sigma_y", YIELD), (i, strains[i])
+        assert found.residual <= 1e-11
+        # measured: 4e-12 of the yield stress at worst; the contract says 1e-7
+        assert np.abs(found.stress - out.stress[i]).max() <= 1e-9 * values.get("sigma_y", YIELD), (i, strains[i])
         for key, value in found.state.items():
-            assert np.abs(value - out.state[key][i]).max() * 12e6 <= 1e-5 * YIELD, (i, key)
+            assert np.abs(value - out.state[key][i]).max() * 12e6 <= 1e-7 * YIELD, (i, key)
         energy = (
             update.energy(strains[i], {k: v[i : i + 1] for k, v in out.state.items()}, **values)[0] + out.dissipation[i]
         )
         assert found.objective == pytest.approx(energy, rel=1e-7, abs=1e-7)
         apex += bool(out.dissipation[i] > 0 and in_apex(out, old, i)) if law.internal else 0
-    assert loose <= 0.01 * count
     if name in ("sand", "texsol", "reinforced_sand", "drucker_prager"):
         assert apex >= 0.2 * count
 
