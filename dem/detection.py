@@ -34,7 +34,7 @@ def _pairs(
     for a in range(3):
         low[a] = x[:, a].min()
         # no more cells along one axis than bodies: a lone far body must not exhaust the memory
-        cells[a] = min(int((x[:, a].max() - low[a]) / size) + 1, max(count, 1))
+        cells[a] = int(min((x[:, a].max() - low[a]) / size, float(count))) + 1
     span = np.empty(3)
     for a in range(3):
         span[a] = max(size, (x[:, a].max() - low[a]) / cells[a] * (1.0 + 1e-12))

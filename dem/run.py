@@ -234,5 +234,5 @@ def load_record(path: Path | str) -> TriaxialRecord:
         raise InputError(f"{path}: the run is not finished; go on with `fenchel dem ... --resume`")
     try:
         return record_of(content, settings)
-    except TypeError:
+    except (KeyError, TypeError):
         raise InputError(f"{path}: the record is incomplete; run it again") from None

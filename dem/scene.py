@@ -69,7 +69,7 @@ class Wires(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
 class Sample(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """How the sample is made before the test."""
 
-    solid_fraction: Annotated[float, _key("of grains and beads, before compression", "1", gt=0, le=0.62)] = 0.57
+    solid_fraction: Annotated[float, _key("of grains and beads, before compression", "1", ge=0.1, le=0.62)] = 0.57
     friction: Annotated[float, _key("Coulomb coefficient during compression: 0 gives a dense sample", "1", ge=0)] = 0.0
     tolerance: Annotated[
         float, _key("relative impulse change that stops the sweeps of the preparation", "1", gt=0, lt=1)
@@ -108,7 +108,7 @@ class SceneSolve(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
 class Scene(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """One sample and one test: `fenchel dem SCENE.toml -o RUN.h5`."""
 
-    seed: Annotated[int, _key("of the random sample", "1", ge=0)] = 1
+    seed: Annotated[int, _key("of the random sample", "1", ge=0, le=2**63 - 1)] = 1
     grains: Annotated[Grains, _key("the grains", "–")] = Grains()
     wires: Annotated[Wires | None, _key("the wires; leave out for sand alone", "–")] = None
     sample: Annotated[Sample, _key("the preparation", "–")] = Sample()
@@ -179,6 +179,8 @@ def check_bodies(grains: Grains, wires: Wires | None, sample: Sample, name: str)
     small, large = grains.radius
     if not 0.0 < small <= large:
         raise InputError(f"{name}: grains.radius = [{small:g}, {large:g}]: needs 0 < smallest ≤ largest, in metres")
+    if not 1e-7 <= small <= large <= 1e2:
+        raise InputError(f"{name}: grains.radius = [{small:g}, {large:g}]: must lie between 1e-7 and 1e2 m")
     if large > 100.0 * small:
         raise InputError(f"{name}: grains.radius: ratio {large / small:.3g} is above 100; narrow the distribution")
     if grains.normal_stiffness is not None and grains.normal_stiffness <= 0.0:
@@ -193,6 +195,10 @@ def check_bodies(grains: Grains, wires: Wires | None, sample: Sample, name: str)
     bead_volume = wires.count * wires.beads * wires.bead_radius**3
     side = (4.0 / 3.0 * math.pi * (grains.count * mean_cube + bead_volume) / sample.solid_fraction) ** (1.0 / 3.0)
     length = (wires.beads - 1) * wires.spacing
+    if wires.spacing > side:
+        raise InputError(
+            f"{name}: wires.spacing = {1e3 * wires.spacing:.3g} mm is wider than the box ({1e3 * side:.3g} mm): a link does not fit"
+        )
     if length > 5.0 * side:
         raise InputError(
             f"{name}: wires: one wire of {wires.beads} beads is {1e3 * length:.3g} mm long, more than five sides of the box "
@@ -222,11 +228,34 @@ def check_pressure(pressure: float, key: str, name: str) -> None:
         )
 
 
+def check_soft(grains: Grains, pressure: float, key: str, name: str) -> None:
+    """Contacts that yield by a good part of a radius are no contacts of grains: mean overlap is about 2 r̄/κ, κ = k_n/(P d)."""
+    if grains.normal_stiffness is None:
+        return
+    kappa = grains.normal_stiffness / (pressure * sum(grains.radius))
+    if kappa < 10.0:
+        raise InputError(
+            f"{name}: {key} = {pressure:g} Pa: κ = k_n/(P d) = {kappa:.2g} is below 10, the grains would run into one another; "
+            "lower the pressure or raise grains.normal_stiffness"
+        )
+
+
+def check_sphere(count: int, sphere: float, name: str) -> None:
+    """A strain needs grains in the measuring sphere."""
+    inside = count * math.pi / 6.0 * sphere**3
+    if inside < 8.0:
+        raise InputError(
+            f"{name}: triaxial.sphere = {sphere:g} holds about {inside:.2g} of the {count} grains: needs 8; widen it or take more grains"
+        )
+
+
 def check_scene(scene: Scene, name: str = "scene") -> Scene:
     """Rules that reach across keys; raises `InputError`, returns the scene."""
     check_finite(scene, name)
     check_bodies(scene.grains, scene.wires, scene.sample, name)
     check_pressure(scene.triaxial.pressure, "triaxial.pressure", name)
+    check_soft(scene.grains, scene.triaxial.pressure, "triaxial.pressure", name)
+    check_sphere(scene.grains.count, scene.triaxial.sphere, name)
     check_path(scene.triaxial.strain_path, name)
     return scene
 

@@ -218,6 +218,12 @@ class Simulation:
                 f"(natural map {measures[0]:.2e}, t = {a.time:.6g} s): raise solve.sweep_limit, loosen "
                 "solve.tolerance (rigid packings settle for 1e-4), or give the grains a stiffness"
             )
+        half = a.half + step * box[:, 0]
+        if np.any(half <= a.grain_radius):
+            raise ConvergenceError(
+                f"the box collapsed at t = {a.time:.6g} s (half lengths {np.array2string(half, precision=2)} m): reduce the step "
+                f"(now {step:.3g} s), stiffen the contacts, or start from a denser sample"
+            )
         a.elastic_energy = float(measures[9])
         a.velocity, a.spin = vel[:, 0:3].copy(), vel[:, 3:6].copy()
         a.box_velocity = box[:, 0].copy()
@@ -226,7 +232,7 @@ class Simulation:
         if law.links:
             a.link_impulse = rows.link_row[:, 3].copy()
         a.x += step * a.velocity
-        a.half += step * a.box_velocity
+        a.half = half
         a.time += step
         self.contacts = rows
         return dict(zip(MEASURES, measures.tolist(), strict=True))

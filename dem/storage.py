@@ -5,6 +5,7 @@ The image is built in memory, written beside the target, flushed to the disk and
 
 from __future__ import annotations
 
+import hashlib
 import io
 import json
 import os
@@ -81,6 +82,20 @@ def _take(group: Any) -> dict[str, Any]:
     return out
 
 
+def _digest(value: Any) -> str:
+    """Hash of a nested dictionary: a damaged number must not pass for a result."""
+    hashed = hashlib.sha256()
+    if isinstance(value, dict):
+        for key in sorted(value):
+            hashed.update(f"{key}={_digest(value[key])};".encode())
+    elif isinstance(value, np.ndarray):
+        hashed.update(f"{value.dtype.str}{value.shape}".encode())
+        hashed.update(np.ascontiguousarray(value).tobytes())
+    else:
+        hashed.update(repr(value.item() if hasattr(value, "item") else value).encode())
+    return hashed.hexdigest()
+
+
 def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]) -> None:
     """Write a nested dictionary of arrays, numbers and strings as one HDF5 file, with the settings and versions that made it."""
     import h5py
@@ -94,6 +109,7 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
             "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
         )
         file.attrs["settings"] = json.dumps(settings, sort_keys=True)
+        file.attrs["digest"] = _digest(content | {"settings": file.attrs["settings"]})
         for key, value in content.items():
             _put(file, key, value)
     replace_file(path, image.getvalue())
@@ -115,13 +131,17 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
                     f"{path}: format {file.attrs['format']} is not {FORMAT}: run it again with this version"
                 )
             content = _take(file)
+        for name in ("format", "program", "python", "conventions"):
+            content.pop(name, None)
+        if content.pop("digest", None) != _digest(content):
+            raise InputError(f"{path}: damaged run file (its content does not match its checksum): run it again")
+        settings = json.loads(content.pop("settings"))
+    except InputError:
+        raise
     except FileNotFoundError:
         raise InputError(f"{path}: no such run file: check the name") from None
-    except (OSError, RuntimeError, KeyError, ValueError) as error:
+    except Exception as error:
         raise InputError(
-            f"{path}: unreadable or truncated run file ({str(error).splitlines()[0]}): run it again"
+            f"{path}: unreadable or truncated run file ({(str(error) or type(error).__name__).splitlines()[0]}): run it again"
         ) from None
-    settings = json.loads(content.pop("settings"))
-    for key in ("format", "program", "python", "conventions"):
-        content.pop(key, None)
     return content, settings

@@ -45,6 +45,8 @@ def test_a_stopped_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     for name in ("axial_strain", "wall_stress", "grain_moment", "link_moment", "grain_fit", "bead_fit"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(again, name))
     assert whole.quality == again.quality
+    # the worst of a run is over all of its steps, also those between two frames
+    assert whole.quality["unbalanced_max"] > whole.series["unbalanced"].max()
     a, _ = load_run(tmp_path / "whole.h5")
     b, _ = load_run(file)
     for name, value in a["assembly"].items():
@@ -76,6 +78,29 @@ def test_truncated_foreign_and_missing_files_are_one_line(tmp_path: Path) -> Non
     with pytest.raises(InputError, match="no such run file"):
         load_record(tmp_path / "absent.h5")
     with pytest.raises(InputError, match="not finished"):
+        load_record(good)
+
+
+def test_a_damaged_file_is_refused_and_not_read(tmp_path: Path) -> None:
+    """Any changed byte of a number, and settings that are no JSON; a file that HDF5 still opens must not pass for a result."""
+    import h5py
+
+    good = tmp_path / "good.h5"
+    numbers = np.arange(300.0)
+    save_run(good, {"record": {"a": numbers}, "seed": 3}, {"b": 1})
+    load_run(good)
+    data = good.read_bytes()
+    at = data.index(numbers.tobytes()) + 8 * 250
+    bad = tmp_path / "bad.h5"
+    bad.write_bytes(data[:at] + b"\x17" + data[at + 1 :])
+    with pytest.raises(InputError, match="checksum"):
+        load_run(bad)
+    bad.write_bytes(data)
+    with h5py.File(bad, "a") as file:
+        file.attrs["settings"] = "{"
+    with pytest.raises(InputError, match="checksum"):
+        load_run(bad)
+    with pytest.raises(InputError, match="incomplete"):
         load_record(good)
 
 

@@ -21,6 +21,10 @@ BAD = {
     "reversed radii": ("[grains]\nradius = [2e-3, 1e-3]\n", ["grains.radius", "smallest"]),
     "wire longer than fits": ("[wires]\nbeads = 500\n", ["wires", "does not fit"]),
     "unknown law": ('[wires]\nlaw = "rope"\n', ["wires.law", "rope"]),
+    "link wider than the box": ("[wires]\nbeads = 2\nspacing = 0.05\n", ["wires.spacing", "does not fit"]),
+    "radius of no grain": ("[grains]\nradius = [1e200, 1e200]\n", ["grains.radius", "between"]),
+    "almost empty box": ("[sample]\nsolid_fraction = 1e-9\n", ["sample.solid_fraction"]),
+    "empty measuring sphere": ("[triaxial]\nsphere = 0.05\n", ["triaxial.sphere", "grains"]),
     "path that does not start at zero": (
         "[triaxial]\nstrain_path = [0.1, 0.0]\n",
         ["triaxial.strain_path", "start at 0"],
@@ -57,6 +61,32 @@ def test_a_pressure_of_zero_needs_cohesion(tmp_path: Path) -> None:
     assert "triaxial.pressure" in complaint(read_scene, file)
     file.write_text("[triaxial]\npressures = [5e4, 0.0]\n")
     assert "cohesion" in complaint(read_study, file)
+
+
+def test_grains_that_would_run_into_one_another_are_refused(tmp_path: Path) -> None:
+    file = tmp_path / "file.toml"
+    file.write_text("[grains]\nnormal_stiffness = 4.3e4\n[triaxial]\npressure = 1e7\n")
+    assert "κ" in complaint(read_scene, file)
+    file.write_text("[grains]\nnormal_stiffness = 4.3e4\n[triaxial]\npressures = [5e4, 7e4]\nheld_out = [1e7]\n")
+    assert "triaxial.held_out" in complaint(read_study, file)
+
+
+def test_what_the_identification_cannot_use_is_refused_before_the_runs(tmp_path: Path) -> None:
+    file = tmp_path / "file.toml"
+    for text, word in {
+        "pressures = [5e4]": "two or more",
+        "pressures = []": "two or more",
+        "strain_path = [0.0, 0.01]": "shorten",
+        "strain_path = [0.0, -1e-4]": "window_sand",
+        "frame_strain = 1e-2": "frame_strain",
+    }.items():
+        file.write_text(f"[triaxial]\n{text}\n")
+        assert word in complaint(read_study, file)
+    for seed in (-1, 2**63):
+        file.write_text(f"[solve]\nseeds = [{seed}]\n")
+        assert "solve.seeds" in complaint(read_study, file)
+        file.write_text(f"seed = {seed}\n")
+        assert "seed" in complaint(read_scene, file)
 
 
 def test_study_rules(tmp_path: Path) -> None:

@@ -249,6 +249,15 @@ def test_detection_equals_brute_force() -> None:
         np.testing.assert_array_equal(found, expected)
 
 
+def test_a_box_that_turns_inside_out_raises() -> None:
+    a = Assembly.of_spheres(np.zeros((1, 3)), np.full(1, 1e-3), np.full(1, 1e-5), np.full(3, 1e-1))
+    simulation = Simulation(a, Material(), Solver())
+    with pytest.raises(ConvergenceError, match="box collapsed"):
+        for _ in range(100):
+            simulation.advance(1e-2, Drive(pressure=np.full(3, PRESSURE)))
+    assert np.all(a.half > 0.0)
+
+
 def test_an_unconverged_step_raises_unless_it_is_wanted() -> None:
     a = sample(1)
     drive = Drive(pressure=np.full(3, PRESSURE))

@@ -18,6 +18,8 @@ from ..dem.scene import (
     check_finite,
     check_path,
     check_pressure,
+    check_soft,
+    check_sphere,
     parse_toml,
     read_toml,
 )
@@ -99,18 +101,36 @@ def check_study(study: Study, name: str = "study") -> Study:
     check_finite(study, name)
     check_bodies(study.grains, study.wires, study.sample, name)
     check_path(study.triaxial.strain_path, name)
-    if not study.triaxial.pressures:
+    check_sphere(study.grains.count, study.triaxial.sphere, name)
+    if study.triaxial.strain_path[1] > 0.0:
         raise InputError(
-            f"{name}: triaxial.pressures is empty: name at least one pressure to fit, e.g. [5e4, 7e4, 9e4]"
+            f"{name}: triaxial.strain_path: the first leg must shorten the sample (a negative strain); "
+            "yield is read there, e.g. [0.0, -0.01, 0.006, -0.01]"
+        )
+    if -study.triaxial.strain_path[1] <= study.identify.window_sand:
+        raise InputError(
+            f"{name}: triaxial.strain_path: the first leg ends inside identify.window_sand = {study.identify.window_sand:g}: "
+            "shorten further, so that there is plastic flow to read"
+        )
+    if 0.25 * study.triaxial.frame_strain > study.identify.window_sand:
+        raise InputError(
+            f"{name}: triaxial.frame_strain = {study.triaxial.frame_strain:g}: leaves no frame in identify.window_sand = "
+            f"{study.identify.window_sand:g}; the first frames are a quarter of it apart"
         )
     for key in ("pressures", "held_out"):
         for pressure in getattr(study.triaxial, key):
             check_pressure(pressure, f"triaxial.{key}", name)
+            check_soft(study.grains, pressure, f"triaxial.{key}", name)
     if len(set(study.pressures)) < len(study.pressures):
         raise InputError(f"{name}: triaxial.pressures and triaxial.held_out repeat a pressure; name each once")
+    if len(study.triaxial.pressures) < 2:
+        raise InputError(
+            f"{name}: triaxial.pressures = {list(study.triaxial.pressures)}: cohesion and friction need two or more to fit, "
+            "e.g. [5e4, 7e4, 9e4]"
+        )
     seeds = study.solve.seeds
-    if not seeds or len(set(seeds)) < len(seeds) or min(seeds) < 0:
-        raise InputError(f"{name}: solve.seeds = {list(seeds)}: needs at least one, all different, none negative")
+    if not seeds or len(set(seeds)) < len(seeds) or min(seeds) < 0 or max(seeds) >= 2**63:
+        raise InputError(f"{name}: solve.seeds = {list(seeds)}: needs at least one, all different, from 0 to 2^63 - 1")
     return study
 
 
