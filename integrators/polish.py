@@ -108,7 +108,7 @@ def natural_map(program: Program, x: Array, z: Array) -> float:
     return max(float(np.abs(program.gradient(x, z)).max(initial=0.0)), float(np.abs(feasible).max(initial=0.0)))
 
 
-def polish(program: Program, x: Array, z: Array, *, goal: float = 1e-13, turns: int = 12) -> tuple[Array, Array, float]:
+def polish(program: Program, x: Array, z: Array, *, goal: float = 1e-13, turns: int = 20) -> tuple[Array, Array, float]:
     """Better (x, z) and its natural map; never a worse one. `x` and `z` are any start, best an interior point's answer.
 
     `goal` is relative to the largest entry of x, z and the data, where that exceeds 1.
@@ -118,13 +118,15 @@ def polish(program: Program, x: Array, z: Array, *, goal: float = 1e-13, turns: 
     tau, stalled = 1e3, 0
     for _ in range(turns):
         scale = max(1.0, *(float(np.abs(v).max(initial=0.0)) for v in (best[0], best[1], program.q, program.b)))
-        if best[2] <= goal * scale or stalled > 1:
+        if best[2] <= goal * scale or stalled > 4:
             break
         x = _inner(program, best[0], best[1], tau, max(1e-15 * scale, 1e-3 * best[2]))
         z = _project(best[1] + tau * (program.A @ x - program.b), program.cones)[0]
         residual = natural_map(program, x, z)
         stalled = stalled + 1 if not residual < 0.5 * best[2] else 0
         if residual < best[2]:
+            # slow and still falling: a stiffer penalty; its rounding, if too stiff, shows as a growing residual below
+            tau = min(10 * tau, 1e6) if residual > 0.1 * best[2] else tau
             best = (x, z, residual)
         else:
             tau *= 0.1
