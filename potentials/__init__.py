@@ -12,6 +12,7 @@ from .resolve import load_law
 from .scalars import parameter, parameters, scalar
 from .stiffness import isotropic, lame
 from .tensor import dev, identity, sym_tensor
+from .unilateral import unilateral_conjugate, unilateral_energy
 
 __all__ = [
     "DeclarationError",
@@ -32,4 +33,6 @@ __all__ = [
     "scalar",
     "sym_tensor",
     "tr",
+    "unilateral_conjugate",
+    "unilateral_energy",
 ]

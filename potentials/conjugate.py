@@ -11,6 +11,7 @@ What no rule covers is refused with the term that is in the way.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 from sympy import Expr, S, factor, latex, sstr
 
@@ -19,6 +20,7 @@ from .energy_terms import sort_energy
 from .invariants import inner, tr
 from .law import Law
 from .tensor import SymmetricTensor, TensorSymbol, sym_tensor
+from .unilateral import unilateral_conjugate
 
 __all__ = ["Phase", "StressPotential", "partial_conjugate"]
 
@@ -32,6 +34,19 @@ class Phase:
     text: str
     tex: str
     shift: SymmetricTensor | None = None
+    moduli: tuple[Expr, Expr] = (S.Zero, S.Zero)
+
+    def value(self, stress: Any, **values: float) -> Any:
+        """ψ* of this phase [J/m³] at the stresses [Pa] (n, 6), Mandel components, in its own strain (without σ:x); `values` by name."""
+        import numpy as np
+
+        table = {s: float(values[s.name]) for e in self.moduli for s in e.free_symbols}  # type: ignore[attr-defined]
+        lam, mu = (float(e.xreplace(table)) for e in self.moduli)
+        if self.energy is None:
+            return unilateral_conjugate(stress, lam, mu)
+        sig = np.asarray(stress, dtype=float)
+        trace = sig[..., :3].sum(axis=-1)
+        return (sig * sig).sum(axis=-1) / (4 * mu) - lam * trace**2 / (4 * mu * (2 * mu + 3 * lam))
 
 
 @dataclass(frozen=True)
@@ -102,7 +117,7 @@ def _hooke_phase(stress: TensorSymbol, lam: Expr, mu: Expr, shift: SymmetricTens
     )
     if shift is not None:
         energy = energy + inner(stress, shift)
-    return Phase(stress, energy, sstr(energy), latex(energy), shift)
+    return Phase(stress, energy, sstr(energy), latex(energy), shift, (lam, mu))
 
 
 def _wire_phase(stress: TensorSymbol, lam: Expr, mu: Expr) -> Phase:
@@ -114,6 +129,7 @@ def _wire_phase(stress: TensorSymbol, lam: Expr, mu: Expr) -> Phase:
             None,
             f"inner({s}, {s})/(4*{m}) if {s} >= 0 (semidefinite), else +oo",
             rf"\frac{{{tex}:{tex}}}{{4{mt}}} + I_{{\mathbb{{S}}_+}}({tex})",
+            moduli=(lam, mu),
         )
     text = (
         f"y**2/(2*{l}) + inner({s} - y*I, {s} - y*I)/(4*{m}), y = min(smallest eigenvalue of {s}, {l}*tr({s})/(2*{m} + 3*{l})), "
@@ -123,4 +139,4 @@ def _wire_phase(stress: TensorSymbol, lam: Expr, mu: Expr) -> Phase:
         rf"I_{{\mathbb{{S}}_+}}({tex}) + \frac{{y^2}}{{2{lt}}} + \frac{{\|{tex} - y \boldsymbol{{I}}\|^2}}{{4{mt}}},\quad "
         rf"y = \min\left(\lambda_{{min}}({tex}), \frac{{{lt}\,\mathrm{{tr}}\,{tex}}}{{2{mt} + 3{lt}}}\right)"
     )
-    return Phase(stress, None, text, formula)
+    return Phase(stress, None, text, formula, moduli=(lam, mu))
