@@ -19,6 +19,7 @@ from fenchel.identify import (
     jackknife_deviation,
     least_absolute_line,
     least_squares_line,
+    quality_notes,
 )
 from fenchel.identify.elastic import unit_hooke, unit_wire
 from fenchel.identify.jsonable import jsonable
@@ -102,6 +103,38 @@ def test_octants_are_a_floor_of_the_spread():
     assert e.source == "octants" and e.high - e.low > 0.3
     wide = estimate("x", "1", 1.0, [0.5, 1.5], replicas)
     assert wide.source == "seeds" and wide.low == 0.0  # clipped at the physical bound
+
+
+def test_failed_replicas_do_not_narrow_the_interval():
+    """Five of eight octants left: the spread is the same on average, not √(4/7) of it."""
+    rng = np.random.default_rng(5)
+    whole, part = [], []
+    for _ in range(2000):
+        octants = rng.standard_normal(8)
+        replicas = np.array([np.delete(octants, k).mean() for k in range(8)])
+        whole.append(estimate("x", "1", 0.0, [0.0], [replicas], lower=None).octant_deviation ** 2)
+        replicas[:3] = np.nan
+        part.append(estimate("x", "1", 0.0, [0.0], [replicas], lower=None).octant_deviation ** 2)
+    assert np.mean(whole) == pytest.approx(1.0 / 8.0, rel=0.05)
+    assert np.mean(part) == pytest.approx(1.0 / 8.0, rel=0.05)
+    few = np.array([1.0, 1.1, 0.9] + [np.nan] * 5)
+    assert estimate("x", "1", 1.0, [1.0], [few]).source == "none"
+
+
+def test_a_value_at_its_bound_everywhere_has_no_interval_of_no_width():
+    e = estimate("H_i", "Pa", 0.0, [0.0, 0.0], [[0.0] * 8] * 2, note="at its lower bound")
+    assert e.source == "none" and np.isnan(e.low) and np.isnan(e.high)
+    some = estimate("H_i", "Pa", 0.0, [0.0, 0.0], [[0.0] * 7 + [1.0]] * 2)
+    assert some.source == "octants" and some.low == 0.0 and some.high > 0.0
+
+
+def test_quality_notes_say_what_is_not_met():
+    good = {"inertial_number": 5e-4, "unbalanced_max": 1e-3, "violation_over_radius": 1e-5, "wall_box_difference": 1e-3}
+    assert quality_notes([good]) == []
+    (note,) = quality_notes([good, good | {"unbalanced_max": 0.03}])
+    assert "NOT MET in 1 of 2" in note and "0.03" in note
+    assert "NOT MET" in quality_notes([good | {"inertial_number": float("nan")}])[0]
+    assert "17%" in quality_notes([good | {"wall_sphere_difference": 0.17}])[0]
 
 
 def test_effective_hardening():

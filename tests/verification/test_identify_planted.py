@@ -180,6 +180,29 @@ def test_control_and_its_difference(noisy):
     assert found.octant_deviation < 0.5 * noisy.estimates["q@0.005@50000"].octant_deviation
 
 
+def test_sand_alone_has_no_mismatch_and_no_wires():
+    """Without beads there is no second strain: zeros must not be read as one."""
+    values = {}
+    for P in (5e4, 9e4):
+        h = planted_law.history(TABLE_3, P, linked=False)
+        values[P] = type(h)(**{**vars(h), "strain_wire": 0.0 * h.strain_sand, "linked": True})
+    found = identify_law([Specimen(seed=1, linked=values)], IdentifyOptions(fit_frames=30))
+    assert all(np.isnan(m.end_of_first_leg) for m in found.mismatches)
+    text = " ".join(found.findings)
+    assert "Strains of the phases" not in text and "sand alone" in text and "control" not in text
+
+
+def test_what_links_change_is_said_at_the_largest_strain_reached():
+    """The sphere strains less than the box: the last of the stated strains may not be there."""
+    specimen = Specimen(
+        seed=1,
+        linked={P: planted_law.history(TABLE_3, P) for P in (5e4, 9e4)},
+        control={P: planted_law.history(TABLE_3, P, linked=False) for P in (5e4, 9e4)},
+    )
+    found = identify_law([specimen], IdentifyOptions(fit_frames=30, strength_strains=(0.0025, 0.005, 0.02)))
+    assert any("Links change q at 0.50%" in text for text in found.findings)
+
+
 def test_held_out_pressure_is_predicted_and_not_fitted(noisy):
     held = [p for p in noisy.predictions if p.held_out and p.linked]
     assert {p.pressure for p in held} == {6e4} and noisy.fitted == (5e4, 9e4)

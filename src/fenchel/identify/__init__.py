@@ -14,7 +14,7 @@ from .parameters import LawParameters
 from .prediction import Prediction, predict
 from .replay import Replay, Simulate, replay
 from .report import write_report
-from .runs_info import RunsInfo, SampleView, Series, quality_rows, series_of
+from .runs_info import RunsInfo, SampleView, Series, quality_notes, quality_rows, series_of
 from .yielding import (
     LineFit,
     YieldFit,
@@ -58,6 +58,7 @@ __all__ = [
     "least_squares_line",
     "phase_mismatch",
     "predict",
+    "quality_notes",
     "quality_rows",
     "replay",
     "sensitivity",

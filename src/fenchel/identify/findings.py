@@ -102,6 +102,9 @@ def _elastic(found: Identification) -> list[str]:
 
 
 def _wires(found: Identification) -> list[str]:
+    e = found.pooled.elastic
+    if found.control is None and e.E_w == 0.0 and e.misfit_wire == 0.0:
+        return ["No link carries stress: this is sand alone."]
     if found.control is None:
         return ["There is no unlinked control: what the beads do cannot be told from what the wires do."]
     c, out = found.control, []
@@ -110,7 +113,9 @@ def _wires(found: Identification) -> list[str]:
         if c.wire_stress_max == 0.0
         else f"The control carries link stress up to {c.wire_stress_max:.3g} Pa: it is not unlinked."
     )
-    strain = found.options.strength_strains[-1]
+    # the sphere strains less than the box: the largest strain that it reached
+    reached = [x for x in found.options.strength_strains if any(k.startswith(f"q@{x:g}@") for k in c.difference)]
+    strain = max(reached, default=0.0)
     marked = [c.difference[k] for k in c.difference if k.startswith(f"q@{strain:g}@")]
     parts = [
         f"{d.value / 1e3:+.2f} ({d.low / 1e3:+.2f} to {d.high / 1e3:+.2f}) at {float(d.name.split('@')[2]) / 1e3:g} kPa"

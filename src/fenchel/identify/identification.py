@@ -136,6 +136,12 @@ def _notes(fit: LawFit) -> dict[str, str]:
     notes: dict[str, str] = {}
     if fit.elastic.nu_at_bound:
         notes["nu"] = "at its bound"
+    for name, value, misfit in (
+        ("E_w", fit.elastic.E_w, fit.elastic.misfit_wire),
+        ("E_w_bilateral", fit.elastic.E_w_bilateral, fit.elastic.misfit_wire_bilateral),
+    ):
+        if value == 0.0:
+            notes[name] = "at its lower bound" if misfit > 0.0 else "no wire stress"
     for name in fit.yielding.at_bound:
         notes[f"{name}_staged"] = "at its lower bound"
     if fit.hardening is not None:

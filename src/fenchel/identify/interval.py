@@ -8,6 +8,11 @@ sources give s:
   − 1 degrees of
   freedom each, root mean square over the samples. It is the floor of the spread, and the only source with one sample.
 
+A replica whose fit failed is missing; the sum over the rest is scaled up to all g, else a failure would narrow the interval.
+With fewer than half of them a sample says nothing.
+
+A value that is the same in every sample and replica (at a bound, or no wires) has no interval: none is given, rather than one of no width.
+
 The half-width is the larger of the two; `source` says which. Two seeds give t = 12.7: such an interval is wide, and rightly so.
 
 Source: Quenouille–Tukey jackknife (Efron 1982, delete-a-group); prediction interval of a normal sample (any textbook).
@@ -74,16 +79,19 @@ def estimate(
     count = len(samples)
     factor = float(np.sqrt(1.0 + 1.0 / max(count, 1)))
     tail = 0.5 + 0.5 * confidence
-    finite = [np.asarray(r, float)[np.isfinite(r)] for r in replicas]
-    finite = [r for r in finite if len(r) >= 2]
+    whole = [np.asarray(r, float) for r in replicas]
+    groups = [(len(r), r[np.isfinite(r)]) for r in whole]
+    groups = [(g, r) for g, r in groups if len(r) >= max(2, 0.5 * g)]
+    # the jackknife, from those that are there
+    squares = [(g - 1) ** 2 / g * float(np.var(r, ddof=1)) for g, r in groups]
     between = float(np.std(samples, ddof=1)) if count >= 2 else float("nan")
-    within = float(np.sqrt(np.mean([float(jackknife_deviation(r)) ** 2 for r in finite]))) if finite else float("nan")
+    within = float(np.sqrt(np.mean(squares))) if squares else float("nan")
     widths: dict[str, float] = {}
     if np.isfinite(between):
         widths["seeds"] = float(student.ppf(tail, count - 1)) * between * factor
     if np.isfinite(within):
-        widths["octants"] = float(student.ppf(tail, sum(len(r) - 1 for r in finite))) * within * factor
-    if widths and np.isfinite(value):
+        widths["octants"] = float(student.ppf(tail, sum(len(r) - 1 for _, r in groups))) * within * factor
+    if np.isfinite(value) and max(widths.values(), default=0.0) > 1e-12 * abs(value):
         source = max(widths, key=lambda key: widths[key])
         low, high = value - widths[source], value + widths[source]
         if lower is not None:

@@ -39,6 +39,8 @@ class Mismatch:
 
 def _ratio(test: Curves) -> Array:
     size = np.linalg.norm(test.strain, axis=1)
+    if not np.any(test.strain_wire):  # no wires, or too few beads in the sphere for a strain
+        return np.full(len(size), np.nan)
     valid = size > np.where(test.leg == 0, SMALLEST, LATER * float(size.max()))
     out = np.full(len(size), np.nan)
     out[valid] = np.linalg.norm(test.strain - test.strain_wire, axis=1)[valid] / size[valid]

@@ -20,7 +20,7 @@ from .identification import Identification
 from .jsonable import jsonable
 from .law_file import write_law
 from .report_tables import Table, tables
-from .runs_info import RunsInfo
+from .runs_info import RunsInfo, quality_notes
 
 __all__ = ["figures", "write_report"]
 
@@ -120,7 +120,7 @@ def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
     sentences = "".join(
         f"<li{' class=first' if k == 0 else ''}>{escape(text)}</li>" for k, text in enumerate(found.findings)
     )
-    notes = "".join(f"<p>{escape(text)}</p>" for text in info.notes)
+    notes = "".join(f"<p>{escape(text)}</p>" for text in (*info.notes, *quality_notes(info.quality)))
     stiffness = f"<p>{escape(info.stiffness_note)}</p>" if info.stiffness_note and info.stiffness else ""
     first = f"{found.fitted[0] / 1e3:g}kPa"
     files = "".join(f"<li><code>{escape(name)}</code></li>" for name in info.files)

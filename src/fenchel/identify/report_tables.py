@@ -153,7 +153,7 @@ def _stages(found: Identification) -> Table:
             f"{stage.misfit:.2%}",
             number(stage.condition, 3),
             number(stage.column_ratio),
-            ", ".join(stage.at_bound) or "none",
+            ", ".join((*(found.pooled.yielding.at_bound if stage is hard.staged else ()), *stage.at_bound)) or "none",
         ]
 
     labels = [

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from ..dem.record import TriaxialRecord
 
-__all__ = ["RunsInfo", "SampleView", "Series", "quality_rows", "series_of"]
+__all__ = ["RunsInfo", "SampleView", "Series", "quality_notes", "quality_rows", "series_of"]
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,32 @@ def quality_rows(records: Sequence[TriaxialRecord]) -> list[dict[str, Any]]:
         {"seed": r.seed, "pressure [kPa]": r.pressure / 1e3, "links": "on" if r.linked else "off", **r.quality}
         for r in records
     ]
+
+
+_LIMITS = {
+    "inertial_number": (1e-3, "inertial number"),
+    "unbalanced_max": (1e-2, "mean unbalanced force over the mean contact force"),
+    "violation_over_radius": (1e-3, "gap less elastic deflection over the mean radius"),
+    "wall_box_difference": (5e-2, "difference of wall stress and homogenised stress of the box"),
+    "energy_error": (5e-2, "energy not accounted for over the external work"),
+}
+
+
+def quality_notes(quality: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Sentences on the limits that some run does not keep, and on how far the measuring sphere is from the walls."""
+    out = []
+    for key, (limit, words) in _LIMITS.items():
+        values = [float(row[key]) for row in quality if key in row]
+        over = sum(not value < limit for value in values)
+        if over:
+            out.append(f"NOT MET in {over} of {len(values)} runs: {words} below {limit:g} (worst {max(values):.2g}).")
+    apart = [float(row["wall_sphere_difference"]) for row in quality if "wall_sphere_difference" in row]
+    if apart and max(apart) > 0.05:
+        out.append(
+            f"The stress inside the measuring sphere, from which the law is read, differs from that on the walls by up to {max(apart):.0%} "
+            "(next to a wall a layer carries less): pressures named here are those of the walls."
+        )
+    return out
 
 
 def series_of(records: Sequence[TriaxialRecord]) -> list[Series]:

@@ -167,6 +167,7 @@ def fit_yield(tests: Sequence[Curves], E_s: float, nu: float, options: IdentifyO
     C_0, t, H_eff = (float(v) for v in solution.x * scale)
     names = ("C_0", "theta_f", "H_eff")
     at_bound = tuple(n for n, x, m in zip(names, solution.x, solution.active_mask, strict=True) if m != 0 or x < 1e-9)
+    C_0, t, H_eff = (0.0 if n in at_bound else v for n, v in zip(names, (C_0, t, H_eff), strict=True))
     residual = matrix @ np.array([C_0, t, H_eff]) - root
 
     tau: dict[float, float] = {}
