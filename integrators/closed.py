@@ -26,7 +26,7 @@ from .driving_text import BATCH, DRIVE
 from .structure import ConeStructure, Moduli, find_cone, find_moduli, internal_scalars, internal_tensors
 from .writer import Writer
 
-__all__ = ["closed_module", "stability_list", "state_layout"]
+__all__ = ["closed_module", "coupling_list", "stability_list", "state_layout"]
 
 
 _UNPACK = "    # constants are unpacked here, once all are known"
@@ -109,19 +109,52 @@ def stability_list(law: Law, moduli: Moduli) -> list[tuple[str, Expr]]:
     return found
 
 
+def coupling_list(law: Law, moduli: Moduli) -> list[tuple[tuple[str, ...], tuple[tuple[Expr, ...], ...]]]:
+    """Matrices of moduli (deviatoric, spherical, of scalars) with entries off the diagonal, and the variables of their rows.
+
+    What is not constant in the block of the observable can only stiffen it, so that it is taken at its least.
+    """
+
+    def least(expression: Any) -> Any:
+        return expression.xreplace(dict.fromkeys(expression.atoms(Step), S.Zero))
+
+    names = (law.observable.name, *(x.name for x in internal_tensors(law)))
+    rows = [[moduli.strain, *moduli.mixed], *([m, *row] for m, row in zip(moduli.mixed, moduli.tensors, strict=True))]
+    found = []
+    for kind in (lambda o: o.c0, lambda o: o.c0 + 3 * o.c1):
+        matrix = tuple(tuple(least(kind(o)) for o in row) for row in rows)
+        if all(is_constant(e) for row in matrix for e in row):
+            found.append((names, matrix))
+    found.append((tuple(s.name for s in internal_scalars(law)), moduli.scalars))
+    return [(n, m) for n, m in found if any(e != 0 for i, row in enumerate(m) for j, e in enumerate(row) if i != j)]
+
+
 def _stability(moduli: Moduli, law: Law) -> list[str]:
-    entries = stability_list(law, moduli)
-    return [
+    entries, couplings = stability_list(law, moduli), coupling_list(law, moduli)
+    values = [f"    {p.name} = values_[{i}]" for i, p in enumerate(law.parameters)]
+
+    def free(*expressions: Any) -> str:
+        return " ".join(sorted({s.name for e in expressions for s in e.free_symbols}))
+
+    text = [
         "def moduli_(values_):",
         '    """Moduli of psi by variable, that convexity wants non-negative: (variable, parameters in it, value)."""',
-        *(f"    {p.name} = values_[{i}]" for i, p in enumerate(law.parameters)),
+        *values,
         "    return (",
-        *(
-            f'        ("{name}", "{" ".join(sorted(s.name for s in e.free_symbols))}", {number_code(e)}),'  # type: ignore[attr-defined]
-            for name, e in entries
-        ),
+        *(f'        ("{name}", "{free(e)}", {number_code(e)}),' for name, e in entries),
         "    )",
+        "",
+        "",
+        "def couplings_(values_):",
+        '    """Matrices of moduli that convexity wants semidefinite: (variables, parameters in it, matrix)."""',
+        *values,
+        "    return (",
     ]
+    for names, matrix in couplings:
+        text.append(f'        ("{" ".join(names)}", "{free(*(e for row in matrix for e in row))}", (')
+        text += [f"            ({', '.join(number_code(e) for e in row)})," for row in matrix]
+        text.append("        )),")
+    return [*text, "    )"]
 
 
 def _views(law: Law, source: str, tensors: bool = True, scalars: bool = True) -> list[str]:

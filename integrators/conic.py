@@ -21,10 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import ConvergenceError, DeclarationError, InputError
+from ..errors import ConvergenceError, InputError
 from ..potentials import Law
 from .atoms import ConvexAtoms, FlowAtoms, energy_atoms, flow_atoms
 from .closed import state_layout
+from .convexity import worst_direction
 from .polish import ConeSizes, Program, polish
 
 __all__ = ["ConicSolution", "ConicStep", "conic_step"]
@@ -149,9 +150,9 @@ def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old
     change = x_eps if x_new is None else cp.hstack([x_eps, x_new])
     base = np.concatenate([eps, old])
     # variables: ε = eps + (x_eps) u, X = old + (x_new) u; quadratic part expanded about the base point
+    if worst_direction(energy.hessian) is not None or any(w < 0.0 for w, *_ in (*energy.positive, *energy.spectral)):
+        raise InputError(f"law '{law.name}': psi is not convex for these values; softening is not modelled")
     values, vectors = np.linalg.eigh(energy.hessian / stiffness)
-    if values.min(initial=0.0) < -1e-9 * max(1.0, values.max(initial=0.0)):
-        raise DeclarationError(f"law '{law.name}': the quadratic part of psi is not convex for these values")
     keep = values > 1e-14 * max(values.max(initial=0.0), 1e-300)
     factor = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
     slope = force * strain_unit / energy_unit

@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
 from .closed import state_layout
+from .convexity import worst_direction
 from .module_store import load_module
 from .structure import NoConeStructure
 
@@ -149,6 +150,7 @@ def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
     """Parameter values as an array in the order of `law.parameters`, checked against bounds and against softening."""
     values = np.array(list(update.law.values(given).values()), dtype=float)
     check_moduli(update.law, update.module.moduli_, values)
+    check_couplings(update.law, update.module.couplings_, values)
     return values
 
 
@@ -176,6 +178,20 @@ def check_moduli(law: Law, moduli: Any, values: Array) -> None:
                 "psi would not be convex: softening is not modelled"
             )
         raise InputError(f"law '{law.name}': {shown} give a negative stiffness; psi would not be convex")
+
+
+def check_couplings(law: Law, couplings: Any, values: Array) -> None:
+    """Refuse values that make ψ non-convex in several variables together, though it is convex in each."""
+    table = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
+    for variables, names, matrix in couplings(values):
+        worst = worst_direction(np.array(matrix, dtype=float))
+        if worst is None:
+            continue
+        involved = [n for n, part in zip(variables.split(), worst[1], strict=True) if abs(part) > 1e-6]
+        shown = ", ".join(f"{n} = {table[n]:g}" for n in names.split())
+        raise InputError(
+            f"law '{law.name}': {shown} make psi non-convex in {', '.join(involved)} together; softening is not modelled"
+        )
 
 
 def raise_failures(status: NDArray[np.int64], eps: Array) -> None:

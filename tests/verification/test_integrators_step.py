@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from sympy import sqrt, tan
 
+from fenchel.errors import InputError
 from fenchel.potentials import (
     Law,
     dev,
@@ -341,3 +342,38 @@ def test_certificate_is_small_for_the_step_and_large_for_a_wrong_one():
     old, new = update.pack(None, 100), update.pack({k: 0.99 * v for k, v in out.state.items()}, 100)
     wrong = duality_gap(update, strains, old, new, packed_values(update, values))
     assert (wrong[plastic] >= 1e-6 * out.dissipation[plastic]).all()
+
+
+@pytest.mark.parametrize("solver", ["closed", "conic"])
+@pytest.mark.parametrize(
+    ("energy", "internal", "good", "bad"),
+    [
+        # convex in each back stress, not in both: a (x1:x1 + x2:x2)/2 + b x1:x2 with |b| > a
+        (
+            a / 2 * (inner(x1, x1) + inner(x2, x2)) + b * inner(x1, x2),
+            (eps_p, x1, x2),
+            dict(a=1e6, b=9e5),
+            dict(b=1.1e6),
+        ),
+        # the same in the spherical parts alone
+        (
+            a / 2 * (inner(x1, x1) + inner(x2, x2)) + b * tr(x1) * tr(x2),
+            (eps_p, x1, x2),
+            dict(a=1e6, b=3e5),
+            dict(b=4e5),
+        ),
+        # two scalars
+        (a / 2 * (s1**2 + s2**2) + b * s1 * s2, (eps_p, s1, s2), dict(a=1e6, b=9e5), dict(b=1.1e6)),
+        # a coupling with the plastic strain that eats the stiffness
+        (a / 2 * inner(x1, x1) - b * inner(eps_p, x1), (eps_p, x1), dict(a=1e6, b=0.0), dict(b=1e4)),
+    ],
+)
+def test_softening_that_hides_off_the_diagonal_is_refused(solver, energy, internal, good, bad):
+    surface = norm(dev(sum((f for v, f in ((x1, B1), (x2, B2)) if v in internal), A))) / sqrt(2) + t / 3 * tr(A) - C
+    surface += sum((f for v, f in ((s1, R1), (s2, R2)) if v in internal), 0)
+    law = Law("hidden", psi=ELASTIC + energy, phi_star=indicator(surface), observable=eps, internal=internal)
+    update = law.compile(solver=solver, tangent=False)
+    update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good)
+    with pytest.raises(InputError, match=r"convex.*softening is not modelled") as caught:
+        update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good | bad)
+    assert "\n" not in str(caught.value)
