@@ -17,18 +17,20 @@ from typing import Any
 from sympy import Expr, S, Symbol
 
 from ..potentials import Law
-from ..potentials.derivative import Operator, is_constant
+from ..potentials.derivative import Operator, invariants_of, is_constant
+from ..potentials.energy_terms import sort_energy
 from ..potentials.invariants import NormLeaf
 from ..potentials.printer import number_code
-from ..potentials.scalars import ScalarVariable, Step
+from ..potentials.scalars import ForceScalar, ScalarVariable, Step
 from ..potentials.tensor import Deviator, IdentityTensor, SymmetricTensor, from_terms
 from .driving_text import BATCH, DRIVE
 from .structure import ConeStructure, Moduli, find_cone, find_moduli, internal_scalars, internal_tensors
 from .writer import Writer
 
-__all__ = ["closed_module", "coupling_list", "stability_list", "state_layout"]
+__all__ = ["LIMIT", "NORM", "closed_module", "coupling_list", "stability_list", "state_layout"]
 
 
+NORM, LIMIT = "weight of the norm", "limit at zero force"
 _UNPACK = "    # constants are unpacked here, once all are known"
 
 
@@ -79,7 +81,7 @@ def closed_module(law: Law) -> str:
         f"    return ({', '.join([*constants.values(), '0.0'])},)",
         "",
         "",
-        *_stability(moduli, law),
+        *_stability(moduli, cone, law),
         "",
         "",
         *point,
@@ -91,8 +93,8 @@ def closed_module(law: Law) -> str:
     return "\n".join(text).replace(_UNPACK, unpack) + BATCH + DRIVE
 
 
-def stability_list(law: Law, moduli: Moduli) -> list[tuple[str, Expr]]:
-    """Moduli that convexity of ψ wants non-negative, with what they belong to."""
+def stability_list(law: Law, moduli: Moduli, cone: ConeStructure | None = None) -> list[tuple[str, Expr]]:
+    """Numbers that convexity of ψ and φ*, and φ*(0) = 0, want non-negative, with what they belong to."""
     found: list[tuple[str, Expr]] = []
     for name, operator in [
         (law.observable.name, moduli.strain),
@@ -106,7 +108,15 @@ def stability_list(law: Law, moduli: Moduli) -> list[tuple[str, Expr]]:
                 found.append((name, expression))
         found += [(name, weight) for weight, _ in operator.spectral if is_constant(weight)]
     found += [(s.name, row[k]) for k, (s, row) in enumerate(zip(internal_scalars(law), moduli.scalars, strict=True))]
+    found += [(law.observable.name, weight) for weight, _ in sort_energy(law).positive if is_constant(weight)]
+    if cone is not None:
+        found += [(NORM, cone.a), (LIMIT, -_at_zero_force(law.surfaces[0]))]
     return found
+
+
+def _at_zero_force(function: Any) -> Any:
+    forces = [*invariants_of(function), *function.atoms(ForceScalar)]
+    return function.xreplace(dict.fromkeys(forces, S.Zero))
 
 
 def coupling_list(law: Law, moduli: Moduli) -> list[tuple[tuple[str, ...], tuple[tuple[Expr, ...], ...]]]:
@@ -129,8 +139,8 @@ def coupling_list(law: Law, moduli: Moduli) -> list[tuple[tuple[str, ...], tuple
     return [(n, m) for n, m in found if any(e != 0 for i, row in enumerate(m) for j, e in enumerate(row) if i != j)]
 
 
-def _stability(moduli: Moduli, law: Law) -> list[str]:
-    entries, couplings = stability_list(law, moduli), coupling_list(law, moduli)
+def _stability(moduli: Moduli, cone: ConeStructure | None, law: Law) -> list[str]:
+    entries, couplings = stability_list(law, moduli, cone), coupling_list(law, moduli)
     values = [f"    {p.name} = values_[{i}]" for i, p in enumerate(law.parameters)]
 
     def free(*expressions: Any) -> str:
@@ -138,7 +148,7 @@ def _stability(moduli: Moduli, law: Law) -> list[str]:
 
     text = [
         "def moduli_(values_):",
-        '    """Moduli of psi by variable, that convexity wants non-negative: (variable, parameters in it, value)."""',
+        '    """Numbers that must not be negative, moduli of psi by variable: (what, parameters in it, value)."""',
         *values,
         "    return (",
         *(f'        ("{name}", "{free(e)}", {number_code(e)}),' for name, e in entries),

@@ -152,6 +152,11 @@ def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old
     # variables: ε = eps + (x_eps) u, X = old + (x_new) u; quadratic part expanded about the base point
     if worst_direction(energy.hessian) is not None or any(w < 0.0 for w, *_ in (*energy.positive, *energy.spectral)):
         raise InputError(f"law '{law.name}': psi is not convex for these values; softening is not modelled")
+    for k in flow.limits:
+        if k < 0.0:
+            raise InputError(
+                f"law '{law.name}': f = {-k:g} at zero force; zero force would lie outside the elastic domain of phi_star"
+            )
     values, vectors = np.linalg.eigh(energy.hessian / stiffness)
     keep = values > 1e-14 * max(values.max(initial=0.0), 1e-300)
     factor = np.sqrt(values[keep])[:, None] * vectors[:, keep].T

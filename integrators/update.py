@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
-from .closed import state_layout
+from .closed import LIMIT, NORM, state_layout
 from .convexity import worst_direction
 from .module_store import load_module
 from .structure import NoConeStructure
@@ -171,6 +171,9 @@ def check_moduli(law: Law, moduli: Any, values: Array) -> None:
             raise InputError(
                 f"law '{law.name}': {shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2"
             )
+        if variable in (NORM, LIMIT):
+            rule = "f would not be convex" if variable == NORM else "zero force would lie outside the elastic domain"
+            raise InputError(f"law '{law.name}': {shown} make the {variable} in phi_star {value:g}, negative; {rule}")
         negative = [n for n in involved if table[n] < 0] or involved
         if variable != law.observable.name:
             raise InputError(

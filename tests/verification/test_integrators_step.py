@@ -377,3 +377,17 @@ def test_softening_that_hides_off_the_diagonal_is_refused(solver, energy, intern
     with pytest.raises(InputError, match=r"convex.*softening is not modelled") as caught:
         update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good | bad)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("solver", ["closed", "conic"])
+@pytest.mark.parametrize("bad", [{"C": -1.0}, {"a": -1.0}, {"b": -1e5}, {"c": -1e5}])
+def test_values_that_break_convexity_of_an_unbounded_parameter_are_refused(solver, bad):
+    # no bounds are declared: what the composition rules ask for is enforced on the values
+    wires = b / 2 * pos(tr(eps)) ** 2 + c * inner(pos(eps), pos(eps))
+    law = Law("loose", psi=ELASTIC + wires, phi_star=indicator(a * norm(dev(A)) - C), observable=eps, internal=(eps_p,))
+    good = dict(E=12e6, nu=0.2, C=YIELD, a=1.0, b=1e5, c=1e5)
+    update = law.compile(solver=solver, tangent=False)
+    update([1e-3, 1e-3, 0, 0, 0, 0], None, **good)
+    with pytest.raises(InputError) as caught:
+        update([1e-3, 1e-3, 0, 0, 0, 0], None, **good | bad)
+    assert "\n" not in str(caught.value)
