@@ -240,8 +240,13 @@ def check_soft(grains: Grains, pressure: float, key: str, name: str) -> None:
         )
 
 
-def check_sphere(count: int, sphere: float, name: str) -> None:
-    """A strain needs grains in the measuring sphere."""
+def check_sphere(count: int, sphere: float, path: tuple[float, ...], name: str) -> None:
+    """A strain needs grains in the measuring sphere, a stress needs all of the sphere in the box."""
+    if sphere > math.exp(min(path)):
+        raise InputError(
+            f"{name}: triaxial.sphere = {sphere:g} sticks out of the box when it is shortened by {-min(path):.2g}: "
+            f"at most {math.exp(min(path)):.3g}"
+        )
     inside = count * math.pi / 6.0 * sphere**3
     if inside < 8.0:
         raise InputError(
@@ -255,8 +260,8 @@ def check_scene(scene: Scene, name: str = "scene") -> Scene:
     check_bodies(scene.grains, scene.wires, scene.sample, name)
     check_pressure(scene.triaxial.pressure, "triaxial.pressure", name)
     check_soft(scene.grains, scene.triaxial.pressure, "triaxial.pressure", name)
-    check_sphere(scene.grains.count, scene.triaxial.sphere, name)
     check_path(scene.triaxial.strain_path, name)
+    check_sphere(scene.grains.count, scene.triaxial.sphere, scene.triaxial.strain_path, name)
     return scene
 
 

@@ -133,7 +133,10 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
             content = _take(file)
         for name in ("format", "program", "python", "conventions"):
             content.pop(name, None)
-        if content.pop("digest", None) != _digest(content):
+        digest = content.pop("digest", None)
+        if digest is None:
+            raise InputError(f"{path}: has no checksum: written by an earlier version, or damaged: run it again")
+        if digest != _digest(content):
             raise InputError(f"{path}: damaged run file (its content does not match its checksum): run it again")
         settings = json.loads(content.pop("settings"))
     except InputError:

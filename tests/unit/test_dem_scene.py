@@ -25,6 +25,10 @@ BAD = {
     "radius of no grain": ("[grains]\nradius = [1e200, 1e200]\n", ["grains.radius", "between"]),
     "almost empty box": ("[sample]\nsolid_fraction = 1e-9\n", ["sample.solid_fraction"]),
     "empty measuring sphere": ("[triaxial]\nsphere = 0.05\n", ["triaxial.sphere", "grains"]),
+    "sphere wider than the shortened box": (
+        "[triaxial]\nsphere = 0.95\nstrain_path = [0.0, -0.1]\n",
+        ["triaxial.sphere", "sticks out"],
+    ),
     "path that does not start at zero": (
         "[triaxial]\nstrain_path = [0.1, 0.0]\n",
         ["triaxial.strain_path", "start at 0"],
@@ -92,6 +96,8 @@ def test_what_the_identification_cannot_use_is_refused_before_the_runs(tmp_path:
 def test_study_rules(tmp_path: Path) -> None:
     file = tmp_path / "file.toml"
     file.write_text("[triaxial]\npressures = [5e4]\nheld_out = [5e4]\n")
+    assert "repeat" in complaint(read_study, file)
+    file.write_text("[triaxial]\npressures = [5e4, 50000.01]\n")  # one name for two run files
     assert "repeat" in complaint(read_study, file)
     file.write_text("[solve]\nseeds = [1, 1]\n")
     assert "solve.seeds" in complaint(read_study, file)

@@ -16,6 +16,7 @@ from .. import __version__
 from ..dem.bodies import Assembly
 from ..dem.record import TriaxialRecord
 from ..dem.storage import load_run, replace_file
+from ..errors import InputError
 from .bars import Bars
 from .identification import Identification, identify_law
 from .options import Specimen
@@ -51,7 +52,7 @@ def run_study(
         study = read_study(study_file)
         text = Path(study_file).read_bytes()
     folder = directory / "runs"
-    replace_file(directory / "study.toml", text)
+    _spare(directory, text)
     clock = {"start": time.perf_counter()}
     _warm_up(study)
     clock["compilation"] = time.perf_counter()
@@ -64,6 +65,7 @@ def run_study(
     folder.mkdir(parents=True, exist_ok=True)
     with Bars([*prepare, *tests, *probes], folder, show=show) as bars:
         _run(prepare, jobs, bars)
+        replace_file(directory / "study.toml", text)  # only now: runs of another study have refused by then
         clock["preparation"] = time.perf_counter()
         results = _run([*tests, *probes], jobs, bars)
         clock["tests"] = time.perf_counter()
@@ -73,6 +75,16 @@ def run_study(
     info = _runs_info(study, prepare[0], tests, records, results[len(tests) :], clock)
     write_report(identification, info, directory, signs=signs)
     return identification
+
+
+def _spare(directory: Path, text: bytes) -> None:
+    """Refuse to write over a study or a law that no study run here has left."""
+    if (directory / "runs").exists():
+        return
+    study, law = directory / "study.toml", directory / "law.py"
+    for path in (study, law):
+        if path.exists() and not (path == study and path.read_bytes() == text):
+            raise InputError(f"{path}: is there already and not from a study run here; choose another folder")
 
 
 def _warm_up(study: Study) -> None:
@@ -185,5 +197,7 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
             "that stiffness is an artefact of sweeps and step, not of the sample."
         )
     if parts:
-        parts.append("Secants of wall stress over box strain; the E_s of the law is read inside the sphere, which is stiffer than the box.")
+        parts.append(
+            "Secants of wall stress over box strain; the E_s of the law is read inside the sphere, which is stiffer than the box."
+        )
     return " ".join(parts)

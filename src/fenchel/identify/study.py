@@ -101,7 +101,7 @@ def check_study(study: Study, name: str = "study") -> Study:
     check_finite(study, name)
     check_bodies(study.grains, study.wires, study.sample, name)
     check_path(study.triaxial.strain_path, name)
-    check_sphere(study.grains.count, study.triaxial.sphere, name)
+    check_sphere(study.grains.count, study.triaxial.sphere, study.triaxial.strain_path, name)
     if study.triaxial.strain_path[1] > 0.0:
         raise InputError(
             f"{name}: triaxial.strain_path: the first leg must shorten the sample (a negative strain); "
@@ -121,8 +121,10 @@ def check_study(study: Study, name: str = "study") -> Study:
         for pressure in getattr(study.triaxial, key):
             check_pressure(pressure, f"triaxial.{key}", name)
             check_soft(study.grains, pressure, f"triaxial.{key}", name)
-    if len(set(study.pressures)) < len(study.pressures):
-        raise InputError(f"{name}: triaxial.pressures and triaxial.held_out repeat a pressure; name each once")
+    if len({f"{pressure:.5g}" for pressure in study.pressures}) < len(study.pressures):  # as run files are named
+        raise InputError(
+            f"{name}: triaxial.pressures and triaxial.held_out repeat a pressure (to five digits); name each once"
+        )
     if len(study.triaxial.pressures) < 2:
         raise InputError(
             f"{name}: triaxial.pressures = {list(study.triaxial.pressures)}: cohesion and friction need two or more to fit, "
