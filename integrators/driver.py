@@ -41,4 +41,5 @@ def drive(
         trace=plan.trace,
         trace_targets=plan.trace_targets,
         initial_state=initial_state,
+        times=plan.time,
     )

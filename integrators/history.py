@@ -50,12 +50,14 @@ def drive_arrays(
     initial_strain: Any = None,
     initial_state: Mapping[str, Any] | None = None,
     tolerance: float = TOLERANCE,
+    times: Any = None,
 ) -> History:
     """Follow a path, one step per row of `targets`.
 
     `control` (6,): True where the stress [Pa] is prescribed, False where the strain [-] is; `targets` (n, 6) the prescribed values,
     Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
-    condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the stress scale.
+    condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the stress scale;
+    `times` (n,), where given, are named in messages beside the row.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
     mask = np.asarray(control, dtype=bool)
@@ -85,7 +87,13 @@ def drive_arrays(
         )
     plan = _plan(mask, free, goals, trace, condition)
     packed = packed_values(update, values)
-    return _run(update, plan, packed, initial_strain, initial_state, tolerance)
+    try:
+        start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
+    except (TypeError, ValueError):
+        start = np.full(6, np.nan)
+    if not np.isfinite(start).all():
+        raise InputError("drive: initial_strain must be six finite Mandel components")
+    return _run(update, plan, packed, start, initial_state, tolerance, times)
 
 
 @dataclass(frozen=True)
@@ -134,15 +142,15 @@ def _run(
     update: Update,
     plan: _Plan,
     values: Array,
-    initial_strain: Any,
+    start: Array,
     initial_state: Mapping[str, Any] | None,
     tolerance: float,
+    times: Any,
 ) -> History:
     n = len(plan.base)
     eps, sig = np.zeros((n, 6)), np.zeros((n, 6))
     state = np.zeros((n, update.state_size))
     psi, dissipation = np.zeros(n), np.zeros(n)
-    start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
     old = update.pack(initial_state, 1)[0]
     failed, residual, scale = update.module.drive_(
         plan.base,
@@ -162,8 +170,9 @@ def _run(
         TURNS,
     )
     if failed >= 0:
+        when = "" if times is None else f" (t = {float(times[failed]):g})"
         raise ConvergenceError(
-            f"law '{update.law.name}': the path fails at row {failed}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
+            f"law '{update.law.name}': the path fails at row {failed}{when}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
             "take smaller steps, or the prescribed stress cannot be carried"
         )
     return History(eps, sig, update.unpack(state), psi, dissipation, np.zeros(n, dtype=np.int64))

@@ -133,7 +133,7 @@ def _wire_phase(stress: TensorSymbol, lam: Expr, mu: Expr) -> Phase:
         )
     text = (
         f"y**2/(2*{l}) + inner({s} - y*I, {s} - y*I)/(4*{m}), y = min(smallest eigenvalue of {s}, {l}*tr({s})/(2*{m} + 3*{l})), "
-        f"if {s} >= 0 (semidefinite), else +oo"
+        f"if {s} >= 0 (semidefinite), else +oo; for {l} = 0, y = 0 and its term is absent"
     )
     formula = (
         rf"I_{{\mathbb{{S}}_+}}({tex}) + \frac{{y^2}}{{2{lt}}} + \frac{{\|{tex} - y \boldsymbol{{I}}\|^2}}{{4{mt}}},\quad "

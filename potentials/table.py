@@ -7,6 +7,7 @@ reversible strain ε^r = ε − ε^ir. Laws without temperature have no thermal 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -67,8 +68,8 @@ def build_table(law: Law, formulation: str, split: str) -> Table:
     if split not in ("total", "reversible"):
         raise InputError(f"split {split!r} is not known; it is 'total' or 'reversible'")
     irreversible = _irreversible(law) if split == "reversible" else None
-    rows = [*_opening(law, irreversible)]
-    rows += _strain_rows(law, irreversible) if formulation == "strain" else _stress_rows(law, irreversible)
+    rows = [*_opening(law, irreversible, split)]
+    rows += _strain_rows(law, irreversible, split) if formulation == "strain" else _stress_rows(law, irreversible)
     rows += _complementary(law, irreversible)
     return Table(law.name, formulation, split, tuple(rows))
 
@@ -115,11 +116,13 @@ def _force_name(law: Law, variable: Variable, irreversible: TensorSymbol | None)
     return (f"{base[0]}_r", rf"{base[1]}^{{r}}") if variable == irreversible else base
 
 
-def _opening(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
+def _opening(law: Law, irreversible: TensorSymbol | None, block: str) -> list[Row]:
     eps = law.observable.name
     tex = latex_name(eps)
     products = [_product(_force_name(law, v, irreversible), v) for v in law.internal]
-    if irreversible is None:
+    if irreversible is None and block == "reversible":
+        split = Row("decomposition", f"{eps} = {eps}_r, {eps}_ir = 0", rf"{tex} = {tex}^{{r}},\ {tex}^{{ir}} = 0")
+    elif irreversible is None:
         split = Row(
             "decomposition", "sig = sig_r + sig_ir, sig_ir = 0", r"\sigma = \sigma^{r} + \sigma^{ir},\ \sigma^{ir} = 0"
         )
@@ -138,11 +141,11 @@ def _reversible_energy(law: Law, irreversible: TensorSymbol) -> tuple[Any, Tenso
     return law.psi.xreplace({law.observable: reversible + irreversible}), reversible
 
 
-def _strain_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
-    psi, observable, stress = law.psi, law.observable, ("sig_r", r"\sigma^{r}")
+def _strain_rows(law: Law, irreversible: TensorSymbol | None, block: str) -> list[Row]:
+    psi, observable = law.psi, law.observable
+    stress = ("sig_r", r"\sigma^{r}") if block == "total" else ("sig", r"\sigma")
     if irreversible is not None:
         psi, observable = _reversible_energy(law, irreversible)
-        stress = ("sig", r"\sigma")
     rows = [_equation("free energy", ("psi", r"\psi"), psi)]
     rows.append(
         _equation(
@@ -181,7 +184,7 @@ def _stress_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
     eps = law.observable
     left = (f"{eps.name}_r", rf"{latex_name(eps.name)}^{{r}}") if irreversible is not None else _name(eps)
     energies = [_phase_energy(phase, irreversible) for phase in found.phases]
-    inside = (" + ".join(t for t, _ in energies), " + ".join(t for _, t in energies))
+    inside = (_sum(t for t, _ in energies), _sum(t for _, t in energies))
     if len(found.phases) > 1:
         names = [_name(phase.stress) for phase in found.phases]
         total = (" + ".join(n for n, _ in names), " + ".join(n for _, n in names))
@@ -195,6 +198,8 @@ def _stress_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         else (f" - ({sstr(found.internal)})", rf" - \left({latex(found.internal)}\right)")
     )
     rows = [Row("conjugate energy", f"psi_star = {inside[0]}{minus[0]}", rf"\psi^{{*}} = {inside[1]}{minus[1]}")]
+    if len(found.phases) == 1 and found.phases[0].energy is None and not found.internal:
+        rows = []  # the row below says it
     rows += [
         Row("conjugate energy", f"{_phase_name(phase)[0]} = {phase.text}", f"{_phase_name(phase)[1]} = {phase.tex}")
         for phase in found.phases
@@ -233,7 +238,11 @@ def partial_without_shift(phase: Phase) -> Any:
 def _phase_name(phase: Phase) -> tuple[str, str]:
     mark = phase.stress.name.removeprefix("sig").strip("_")
     text = f"psi_{mark}_star" if mark else "psi_star"
-    return f"{text}({phase.stress})", rf"\psi_{{{mark}}}^{{*}}({latex(phase.stress)})"
+    return f"{text}({phase.stress})", rf"\psi{_sub(mark)}^{{*}}({latex(phase.stress)})"
+
+
+def _sum(parts: Iterable[str]) -> str:
+    return " + ".join(parts).replace("+ -", "- ")
 
 
 def _phase_energy(phase: Phase, irreversible: TensorSymbol | None) -> tuple[str, str]:
@@ -280,6 +289,15 @@ def _complementary(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         rows.append(Row("multiplier", "gamma >= 0, f <= 0, gamma*f = 0", r"\gamma \geq 0,\ f \leq 0,\ \gamma f = 0"))
         rates = [_name(v, dot=True) for v in law.internal if v in law.forces]
         forces = [_name(law.forces[v]) for v in law.internal if v in law.forces]
+        rows.append(
+            Row(
+                "force form",
+                f"({', '.join(r for r, _ in rates)}) in dphi_star({', '.join(f for f, _ in forces)}), phi_star = 0 if f <= 0, "
+                "else +oo: the normal cone, also at a vertex, where f has no gradient",
+                rf"({', '.join(r for _, r in rates)}) \in \partial\varphi^{{*}}({', '.join(f for _, f in forces)}),"
+                rf"\ \varphi^{{*}} = I_{{\{{f \leq 0\}}}}",
+            )
+        )
         rows.append(
             Row(
                 "rate form",

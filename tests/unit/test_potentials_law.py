@@ -153,6 +153,18 @@ def test_table_of_the_stress_formulation():
         sand.table("both")
 
 
+def test_table_of_laws_without_internal_variables_and_of_a_single_unilateral_phase():
+    wire, elastic, bilateral = LAWS["wire"], LAWS["linear_elastic"], LAWS["reinforced_sand"]
+    stress = wire.table("stress").text()
+    assert "psi_star = psi_star" not in stress and "for lambda_w = 0, y = 0" in stress
+    assert r"\psi_{}" not in wire.table("stress").latex()
+    reversible = elastic.table("strain", split="reversible").text()
+    assert "eps = eps_r, eps_ir = 0" in reversible and "sig = dpsi/deps" in reversible and "sig_ir" not in reversible
+    assert "+ -" not in bilateral.table("stress").text() + bilateral.table("stress").latex()
+    # the apex is in the table: an inclusion, as the gradient of f does not exist there
+    assert "in dphi_star(A, chi, R)" in sand.table("strain").text()
+
+
 def test_what_has_no_known_conjugate_is_refused():
     prestressed = Law("a", psi=inner(pos(eps + C * identity), pos(eps + C * identity)), observable=eps)
     with pytest.raises(DeclarationError, match="conjugate"):
