@@ -37,7 +37,7 @@ class Assembly:
     link_length: Array  # (m,) reference length [m]
     link_impulse: Array  # (m,) tension impulse of the last step [N s]
     pairs: NDArray[np.int32]  # (c, 2) candidates
-    pair_impulse: Array  # (c, 3) on the first body [N s]
+    pair_impulse: Array  # (c, 4) of the last step: tangential part on the first body, and pressure [N s]
     walls: NDArray[np.int32]  # (w, 3) candidates (body, axis, side)
     wall_impulse: Array  # (w,) [N s]
     listed_x: Array  # (n, 3) positions when the candidates were listed
@@ -86,7 +86,7 @@ class Assembly:
             link_length=lengths,
             link_impulse=np.zeros(len(links)),
             pairs=np.empty((0, 2), dtype=np.int32),
-            pair_impulse=np.zeros((0, 3)),
+            pair_impulse=np.zeros((0, 4)),
             walls=np.empty((0, 3), dtype=np.int32),
             wall_impulse=np.zeros(0),
             listed_x=np.full((n, 3), np.inf),

@@ -39,7 +39,10 @@ def collect_contacts(
     bead_friction: float,
     signed: bool,
 ) -> tuple[Ints, Array]:
-    """Contacts of the candidate `pairs` with gap below `reach` [m]; `impulse`, shape (pair_count, 3), is the warm start."""
+    """Contacts of the candidate `pairs` with gap below `reach` [m].
+
+    `impulse`, shape (pair_count, 4), is the warm start: tangential part on the first body, and pressure.
+    """
     total = pairs.shape[0]
     pair = np.empty((total, 2), dtype=np.int32)
     row = np.empty((total, 16))
@@ -59,14 +62,16 @@ def collect_contacts(
             n0, n1, n2 = d0 / distance, d1 / distance, d2 / distance
         else:
             n0, n1, n2 = 0.0, 0.0, 1.0
-        p0, p1, p2 = impulse[k, 0], impulse[k, 1], impulse[k, 2]
-        # the tangential part turns with the tangent plane and keeps its size, the normal part is the old pressure
-        length = np.sqrt(p0 * p0 + p1 * p1 + p2 * p2)
-        pn = p0 * n0 + p1 * n1 + p2 * n2
-        t0, t1, t2 = p0 - pn * n0, p1 - pn * n1, p2 - pn * n2
-        if pn < 0.0 or length == 0.0:
-            pn = 0.0
-            t0 = t1 = t2 = 0.0
+        # the tangential part turns with the tangent plane and keeps its size, the normal part is the old pressure: a pair that
+        # turns as a whole carries its forces along
+        pn = impulse[k, 3]
+        t0, t1, t2 = impulse[k, 0], impulse[k, 1], impulse[k, 2]
+        size = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        out = t0 * n0 + t1 * n1 + t2 * n2
+        t0, t1, t2 = t0 - out * n0, t1 - out * n1, t2 - out * n2
+        kept = np.sqrt(t0 * t0 + t1 * t1 + t2 * t2)
+        if kept > 0.0:
+            t0, t1, t2 = t0 * size / kept, t1 * size / kept, t2 * size / kept
         mu = bead_friction if is_bead[i] or is_bead[j] else friction
         if mu == 0.0:
             t0 = t1 = t2 = 0.0
@@ -94,8 +99,10 @@ def keep_contacts(row: Array, impulse: Array) -> None:
     """Write the solved impulses back to the candidates they came from."""
     for m in range(row.shape[0]):
         k = int(row[m, 15])
+        pn = row[m, 0] * row[m, 3] + row[m, 1] * row[m, 4] + row[m, 2] * row[m, 5]
         for a in range(3):
-            impulse[k, a] = row[m, 3 + a]
+            impulse[k, a] = row[m, 3 + a] - pn * row[m, a]
+        impulse[k, 3] = pn
 
 
 @njit

@@ -98,7 +98,7 @@ class Simulation:
         if moved < 0.45 * self.skin:
             return
         pairs = find_pairs(a.x, a.radius, a.wire, a.rank, a.apart, self.skin)
-        impulse = np.zeros((len(pairs), 3))
+        impulse = np.zeros((len(pairs), 4))
         if len(a.pairs) and len(pairs):
             n = np.int64(len(a.x))
             old = a.pairs[:, 0] * n + a.pairs[:, 1]

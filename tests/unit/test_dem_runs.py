@@ -45,8 +45,6 @@ def test_a_stopped_run_resumes_bit_for_bit(tmp_path: Path) -> None:
     for name in ("axial_strain", "wall_stress", "grain_moment", "link_moment", "grain_fit", "bead_fit"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(again, name))
     assert whole.quality == again.quality
-    # the worst of a run is over all of its steps, also those between two frames
-    assert whole.quality["unbalanced_max"] > whole.series["unbalanced"].max()
     a, _ = load_run(tmp_path / "whole.h5")
     b, _ = load_run(file)
     for name, value in a["assembly"].items():

@@ -129,7 +129,7 @@ def test_triaxial_with_links_and_the_control(rested: Assembly) -> None:
         assert quality["unbalanced_max"] < 1e-2
         assert quality["natural_map_max"] < 1e-4
         assert quality["wall_box_difference"] < 0.05
-        assert quality["energy_error"] < 0.01
+        assert quality["energy_error"] < 2e-3
         assert quality["inertial_number"] <= 1e-3 * (1 + 1e-12)
         for name in ("friction", "algorithmic"):
             assert np.all(np.diff(record.series[name]) >= -1e-15)
@@ -191,9 +191,13 @@ def test_prestressed_wires_pull_before_the_test() -> None:
         strain_path=(0.0, -1e-4),
         prestressed=True,
     )
+    worst = 0.0
     while not test.done:
-        test.advance()
-    history = test.record(seed=3, settings={}).history()
+        worst = max(worst, test.advance()["unbalanced"])
+    record = test.record(seed=3, settings={})
+    # the worst of a run is over all of its steps, also those between two frames
+    assert record.quality["unbalanced_max"] == worst
+    history = record.history()
     assert np.trace(np.diag(history.stress_links[0, :3])) > 100.0
 
 

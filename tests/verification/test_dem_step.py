@@ -7,6 +7,7 @@ import pytest
 
 from fenchel.dem import Assembly, Drive, Material, Simulation, Solver
 from fenchel.dem.certificate import contact_program
+from fenchel.dem.contacts import collect_contacts, keep_contacts
 from fenchel.dem.detection import find_pairs
 from fenchel.dem.packing import densify
 from fenchel.dem.stepping import Contacts
@@ -233,6 +234,28 @@ def test_free_fall_and_a_rigid_inelastic_shock() -> None:
     assert fall.velocity[0, 2] == pytest.approx(-9.81 * 0.1, rel=1e-12)
     # leap-frog: x holds the position half a step ahead of v, starting from rest at half a step
     assert fall.x[0, 2] == pytest.approx(-0.5 * 9.81 * h**2 * 100 * 101, rel=1e-12)
+
+
+def test_a_pair_that_turns_as_a_whole_carries_its_forces_along() -> None:
+    """Ten small turns about the axis normal to pressure and friction: both keep their size, friction turns with the tangent plane."""
+    radius, stiffness, h = 1e-3, 4e4, 1e-5
+    x = np.array([[0.0, 0.0, -0.99 * radius], [0.0, 0.0, 0.99 * radius]])
+    impulse = np.array([[2e-6, 0.0, 0.0, 5e-6]])
+    pairs = np.array([[0, 1]], dtype=np.int32)
+    velocity = np.zeros((2, 8))
+    velocity[:, 6] = 1e5
+    c, s = np.cos(0.05), np.sin(0.05)
+    turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
+    compliance = 1.0 / (stiffness * h**2)
+    force = np.array([2e-6, 0.0, 0.0])
+    for _ in range(10):
+        x, force = x @ turn.T, turn @ force
+        _, row = collect_contacts(
+            x, np.full(2, radius), velocity, np.zeros(2, dtype=bool), pairs, impulse, radius, h, compliance, compliance, 1.0, 1.0, True
+        )  # fmt: skip
+        keep_contacts(row, impulse)
+    assert row[0, 14] == pytest.approx(5e-6, rel=1e-12) and impulse[0, 3] == pytest.approx(5e-6, rel=1e-12)
+    np.testing.assert_allclose(impulse[0, :3], force, rtol=0, atol=1e-18)
 
 
 def test_detection_equals_brute_force() -> None:
