@@ -163,6 +163,7 @@ def write_report(
     axes = Signs(signs)
     # the pictures' data (positions, series) stay in the run files
     info = {key: jsonable(value) for key, value in vars(runs_info).items() if key not in ("sample", "series")}
+    info["notes"] = [*runs_info.notes, *quality_notes(runs_info.quality)]
     numbers = {"identification": found.to_json(), "runs": info}
     text = json.dumps(numbers, indent=1, ensure_ascii=False, allow_nan=False) + "\n"
     try:
