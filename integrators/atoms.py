@@ -13,7 +13,7 @@ import numpy as np
 from sympy import Add, Dummy, Expr, Float, Mul, Poly, PolynomialError, expand
 
 from ..errors import DeclarationError
-from ..potentials import Law
+from ..potentials import Law, unilateral_energy
 from ..potentials.derivative import invariants_of
 from ..potentials.invariants import InnerLeaf, NormLeaf, PositiveSquareLeaf, TraceLeaf
 from ..potentials.scalars import PositivePart
@@ -35,6 +35,14 @@ class ConvexAtoms:
     constant: float
     positive: tuple[tuple[float, np.ndarray, float], ...]
     spectral: tuple[tuple[float, float, np.ndarray], ...]
+
+    def value(self, z: np.ndarray) -> float:
+        """ψ [J/m³] at z = (ε, X)."""
+        total = 0.5 * z @ self.hessian @ z + self.linear @ z + self.constant
+        total += sum(w * max(float(row @ z) + shift, 0.0) ** 2 for w, row, shift in self.positive)
+        for weight, scale, shift in self.spectral:
+            total += float(unilateral_energy(scale * z[:6] + shift, 0.0, 1.0)) * weight
+        return float(total)
 
 
 @dataclass(frozen=True)

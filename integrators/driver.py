@@ -1,4 +1,7 @@
-"""Material-point test of a law along a path file: the steps as given, under mixed control."""
+"""Material-point test of a law along a path file: the steps as given, under mixed control.
+
+A law without closed form is driven by its conic program, some seconds per step where stresses are prescribed.
+"""
 
 from __future__ import annotations
 
@@ -6,8 +9,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..errors import InputError
 from ..potentials import Law
+from .conic_update import ConicUpdate
 from .history import History, drive_arrays
 from .path_file import StrainStressPath, read_path
 from .update import Update, build_update
@@ -16,7 +19,7 @@ __all__ = ["drive"]
 
 
 def drive(
-    law: Law | Update,
+    law: Law | Update | ConicUpdate,
     path: StrainStressPath | str | Path,
     values: Mapping[str, Any],
     initial_state: Mapping[str, Any] | None = None,
@@ -28,11 +31,7 @@ def drive(
     Raises `InputError` for bad input, `ConvergenceError` with the row where the path cannot be followed.
     """
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
-    update = law if isinstance(law, Update) else build_update(law, solver=solver)
-    if not isinstance(update, Update):
-        raise InputError(
-            f"law '{update.law.name}' has no closed form; paths need one (its step is solved by '{update.solver}')"
-        )
+    update = law if isinstance(law, (Update, ConicUpdate)) else build_update(law, solver=solver)
     return drive_arrays(
         update,
         plan.control,

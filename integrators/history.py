@@ -16,6 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .conic_path import follow
+from .conic_update import ConicUpdate
 from .update import Array, Update, packed_values
 
 __all__ = ["History", "drive_arrays"]
@@ -40,7 +42,7 @@ class History:
 
 
 def drive_arrays(
-    update: Update,
+    update: Update | ConicUpdate,
     control: Any,
     targets: Any,
     values: Mapping[str, Any],
@@ -86,14 +88,15 @@ def drive_arrays(
             f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})"
         )
     plan = _plan(mask, free, goals, trace, condition)
-    packed = packed_values(update, values)
     try:
         start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
     except (TypeError, ValueError):
         start = np.full(6, np.nan)
     if not np.isfinite(start).all():
         raise InputError("drive: initial_strain must be six finite Mandel components")
-    return _run(update, plan, packed, start, initial_state, tolerance, times)
+    if isinstance(update, ConicUpdate):
+        return _run_conic(update, plan, update.law.values(values), start, initial_state, times)
+    return _run(update, plan, packed_values(update, values), start, initial_state, tolerance, times)
 
 
 @dataclass(frozen=True)
@@ -169,10 +172,31 @@ def _run(
         tolerance,
         TURNS,
     )
-    if failed >= 0:
-        when = "" if times is None else f" (t = {float(times[failed]):g})"
-        raise ConvergenceError(
-            f"law '{update.law.name}': the path fails at row {failed}{when}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
-            "take smaller steps, or the prescribed stress cannot be carried"
-        )
+    _raise_failure(update.law.name, failed, residual, scale, times)
     return History(eps, sig, update.unpack(state), psi, dissipation, np.zeros(n, dtype=np.int64))
+
+
+def _run_conic(
+    update: ConicUpdate,
+    plan: _Plan,
+    values: Mapping[str, float],
+    start: Array,
+    initial_state: Mapping[str, Any] | None,
+    times: Any,
+) -> History:
+    state = update.packing.unpack(update.packing.pack(initial_state, 1))
+    failed, residual, scale, found = follow(update, plan.base, plan.goal, plan.z, plan.v, start, state, values)
+    _raise_failure(update.law.name, failed, residual, scale, times)
+    status = np.zeros(len(plan.base), dtype=np.int64)
+    unpacked = update.packing.unpack(found["state"])
+    return History(found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], status)
+
+
+def _raise_failure(name: str, failed: int, residual: float, scale: float, times: Any) -> None:
+    if failed < 0:
+        return
+    when = "" if times is None else f" (t = {float(times[failed]):g})"
+    raise ConvergenceError(
+        f"law '{name}': the path fails at row {failed}{when}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
+        "take smaller steps, or the prescribed stress cannot be carried"
+    )

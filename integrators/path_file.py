@@ -146,10 +146,11 @@ def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]
         columns |= {f"{kind}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
     mean = history.sig[:, :3].sum(axis=1) / 3.0
     deviator = history.sig - mean[:, None] * np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
+    size = np.abs(deviator).max(axis=1, initial=0.0)  # scaled, so that the squares stay in range
     columns |= {
         "eps_v": history.eps[:, :3].sum(axis=1),
         "p": -mean,
-        "q": np.sqrt(1.5) * np.linalg.norm(deviator, axis=1),
+        "q": np.sqrt(1.5) * size * np.linalg.norm(deviator / np.where(size > 0.0, size, 1.0)[:, None], axis=1),
     }
     ends = {"psi": history.psi, "dissipation": history.dissipation, "status": history.status}
     for name, values in history.state.items():

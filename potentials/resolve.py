@@ -33,6 +33,8 @@ def load_law(where: str) -> Law:
         found = runpy.run_path(str(path))
     except FenchelError as error:
         raise InputError(f"law file {place!r}: {error}") from error
+    except SystemExit as error:
+        raise InputError(f"law file {place!r} leaves Python when run (SystemExit {error.code})") from error
     except Exception as error:
         line = str(error).splitlines()[0] if str(error) else ""
         raise InputError(f"law file {place!r} fails when run: {type(error).__name__}: {line}") from error

@@ -34,7 +34,7 @@ def unilateral_conjugate(stress: Any, lam: float, mu: float, *, rounding: float 
 
     A principal stress between −`rounding`·‖σ‖ and 0 counts as zero, so that a computed stress on the boundary of the domain is in it.
 
-    >>> [float(unilateral_conjugate([a, b, c, 0, 0, 0], 1.0, 0.5)) for a, b, c in ((3, 1, 0.2), (1, 0, 0), (1, 1, -1))]
+    >>> [round(float(unilateral_conjugate([*s, 0, 0, 0], 1.0, 0.5)), 9) for s in ((3, 1, 0.2), (1, 0, 0), (1, 1, -1))]
     [4.26, 0.5, inf]
     """
     import numpy as np

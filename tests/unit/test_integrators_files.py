@@ -64,6 +64,15 @@ def test_columns_of_a_history(tmp_path):
     assert last["dissipation"] == pytest.approx(2842.0 * last["internal_p"], rel=1e-9)
 
 
+def test_columns_of_a_huge_stress_stay_finite():
+    from fenchel.integrators.path_file import history_columns
+
+    history = drive_arrays(sand.compile(), [False] * 6, [[1e200, 0, 0, 0, 0, 0]], SAND)
+    with np.errstate(all="raise"):
+        columns = history_columns(history)
+    assert np.isfinite(columns["q"]).all() and columns["q"][0] > 1e150
+
+
 def test_a_stress_that_cannot_be_carried_names_the_row():
     update = drucker_prager.compile()
     values = dict(E=12e6, nu=0.2, theta_f=0.0, C_0=1000.0, H_i=0.0)
@@ -77,6 +86,8 @@ def test_wrong_arrays_are_refused():
     update = sand.compile()
     with pytest.raises(InputError, match="shape"):
         drive_arrays(update, [True] * 5, np.zeros((1, 6)), SAND)
+    with pytest.raises(InputError, match="initial_strain"):
+        drive_arrays(update, [True] * 6, [[0.0] * 6], SAND, initial_strain=[np.nan] * 6)
     with pytest.raises(InputError, match="row 1"):
         drive_arrays(update, [True] * 6, [[0.0] * 6, [np.nan] * 6], SAND)
     with pytest.raises(InputError, match="shape"):

@@ -190,6 +190,9 @@ def test_load_law(tmp_path):
     file.write_text("1/0")
     with pytest.raises(InputError, match="ZeroDivisionError"):
         load_law(f"{file}:mine")
+    file.write_text("raise SystemExit(0)")
+    with pytest.raises(InputError, match="leaves Python"):
+        load_law(f"{file}:mine")
 
 
 def test_import_is_light():

@@ -156,3 +156,15 @@ def test_perfect_plasticity_flows_at_constant_stress():
     values = {"E": 12e6, "nu": 0.2, "theta_f": 0.0, "C_0": 1000.0, "H_i": 0.0}
     history = drive_arrays(drucker_prager.compile(), UNIAXIAL, axial(np.linspace(0, 0.01, 30)), values)
     assert history.sig[-1, 2] == pytest.approx(np.sqrt(3) * 1000.0, rel=1e-9)
+
+
+def test_a_path_by_the_conic_program_equals_the_closed_form(tmp_path):
+    values = {"E": 12e6, "nu": 0.2, "theta_f": 0.3, "C_0": 2842.0, "H_i": 1e6}
+    file = tmp_path / "path.csv"
+    file.write_text("t,eps_zz,eps_yy,sig_xx\n0,0,0,0\n1,-2e-3,0,-2e3\n2,2e-3,0,-1e3\n")
+    closed, conic = drive(drucker_prager, file, values), drive(drucker_prager, file, values, solver="conic")
+    assert closed.dissipation[-1] > 0
+    assert np.abs(conic.sig - closed.sig).max() <= 1e-6 * 2842
+    assert np.abs(conic.eps - closed.eps).max() <= 1e-9
+    assert conic.psi == pytest.approx(closed.psi, rel=1e-6, abs=1e-9)
+    assert conic.dissipation == pytest.approx(closed.dissipation, rel=1e-6, abs=1e-9)

@@ -51,6 +51,7 @@ def _drive(
 
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
     """
+    from fenchel.errors import InputError
     from fenchel.integrators import Update, drive, read_path
     from fenchel.integrators.path_file import history_columns
     from fenchel.potentials import load_law
@@ -61,7 +62,11 @@ def _drive(
     plan = turn_path(read_path(path), signs)
     declared = load_law(law)
     update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
-    history = drive(update if isinstance(update, Update) else declared, plan, values, solver=solver.value)
+    if certify and not isinstance(update, Update):
+        raise InputError(
+            "--certify needs the closed form; the conic program is its own certificate: leave --certify out"
+        )
+    history = drive(update, plan, values)
     columns: dict[str, Any] = dict(history_columns(history, plan.time))
     if certify:
         columns["gap"] = _gaps(update, history, values)
