@@ -1,4 +1,4 @@
-"""The step of a law without closed form: the conic program solved at every point. Slow (about 10 ms per point), right, any conic law.
+"""The step of a law without closed form: the conic program solved at every point. Slow (about 50 ms per point, of which the solver takes a tenth), right, any conic law.
 
 The tangent is a central difference of the program's stress, with steps of 1e-4 of the strain scale: good to about 1e-5, and between two
 elements of the generalised derivative at a kink.

@@ -124,7 +124,7 @@ class Update:
             gap = duality_gap(self, eps, old, new, packed_parameters)
         return StepResult(stress, tangent if self.tangent else None, self.unpack(new), dissipation, status, gap)
 
-    def energy(self, eps: Any, state: Mapping[str, Any] | None = None, **values: Any) -> Array:
+    def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
         """Free energy ψ [J/m³] at the given strains and internal variables, shape (n,)."""
         strain = strain_array(eps)
         psi = np.empty(strain.shape[0])
@@ -204,7 +204,7 @@ def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
         return
     first = ", ".join(str(int(i)) for i in failed[:5])
     reason = {
-        Status.NOT_FINITE: "overflow",
+        Status.NOT_FINITE: "the stress is not finite",
         Status.INFEASIBLE: "no plastically admissible stress",
         Status.ITERATION_LIMIT: "iteration limit",
     }

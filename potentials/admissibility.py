@@ -17,7 +17,7 @@ from .derivative import invariants_of, is_constant
 from .energy_terms import sort_energy
 from .invariants import NormLeaf, TraceLeaf
 from .law import Law
-from .scalars import ForceScalar
+from .scalars import ForceScalar, ScalarVariable
 
 __all__ = ["AdmissibilityReport", "check"]
 
@@ -92,7 +92,15 @@ def _energy(law: Law, conditions: list[tuple[str, Expr]], reasons: list[str]) ->
     for weight, variable in terms.scalars:
         _condition(conditions, weight)
         reasons.append(f"psi: {variable}**2, convex")
-    return [f"psi: no rule for the term {t}" for t in terms.rest]
+    open_ends = []
+    for term in terms.rest:
+        generators = [*invariants_of(term), *term.atoms(ScalarVariable)]
+        linear = len(generators) == 1 and isinstance(generators[0], (TraceLeaf, ScalarVariable))
+        if linear and is_constant(term / generators[0]):
+            reasons.append(f"psi: {term}, linear")
+        else:
+            open_ends.append(f"psi: no rule for the term {term}")
+    return open_ends
 
 
 def _flow(law: Law, conditions: list[tuple[str, Expr]], reasons: list[str]) -> list[str]:

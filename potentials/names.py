@@ -15,8 +15,8 @@ __all__ = ["RESERVED", "checked_name", "latex_name"]
 
 RESERVED = frozenset(
     """
-    abs bool certify complex control divmod dt e eps_new float float64 gap int len list math max min nan
-    njit np numba numpy pi pow print range round sorted stack state status str sum tuple type update
+    abs add_positive_derivative bool certify complex control divmod dt e eps_new float float64 gap int len list math max min nan
+    njit norm6 np numba numpy pi positive_part pow print range round self sorted stack state status str sum tuple type update
     values
     """.split()  # noqa: SIM905
 )

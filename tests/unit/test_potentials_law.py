@@ -136,6 +136,12 @@ def test_check_decides_with_values():
     assert texsol.check(**VALUES).conditions == ()
     assert texsol.check(**VALUES | {"H_k": -1.0}).admissible is False
     assert texsol.check(**VALUES | {"C_0": -1.0}).admissible is False
+    # a linear term is convex of either sign
+    assert Law("tilted", psi=ENERGY - H * tr(eps), observable=eps, internal=(eps_p,)).check(E=1, nu=0.2, H=1).admissible
+    assert (
+        Law("bent", psi=ENERGY - H * tr(eps) ** 2, observable=eps, internal=(eps_p,)).check(E=1, nu=0.2, H=1).admissible
+        is False
+    )
     odd = Law(
         "odd", psi=ENERGY + H * tr(eps) ** 4, phi_star=indicator(norm(dev(A)) - C), observable=eps, internal=(eps_p,)
     )

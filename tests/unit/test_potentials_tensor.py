@@ -149,6 +149,10 @@ def test_bounds_of_parameters():
         "é",
         "a;b",
         "certify",
+        "self",
+        "norm6",
+        "positive_part",
+        "add_positive_derivative",
     ],
 )
 def test_hostile_and_reserved_names_are_refused(name):

@@ -336,6 +336,27 @@ def test_two_surfaces_fall_back_to_the_program():
     assert np.abs(out.tangent - expected.tangent).max() <= 1e-3 * np.abs(expected.tangent).max()
 
 
+def test_two_intersecting_surfaces_satisfy_the_optimality_conditions():
+    from scipy.optimize import nnls
+
+    cone, cut = norm(dev(A)) / sqrt(2) + t / 3 * tr(A) - C, tr(A) / 3 - k2
+    law = Law("cut", psi=ELASTIC, phi_star=indicator(cone, cut), observable=eps, internal=(eps_p,))
+    update = law.compile(tangent=False)
+    rng = np.random.default_rng(6)
+    strains = 10 ** rng.uniform(-3.5, -2, size=(24, 1)) * (rng.normal(size=(24, 6)) + I6)
+    out = update(strains, None, **NUMBERS, k2=2e3)
+    seen = set()
+    for stress, flow in zip(out.stress, out.state["eps_p"], strict=True):
+        shear = np.linalg.norm(DEV @ stress)
+        f = np.array([shear / np.sqrt(2) + 0.2 / 3 * (I6 @ stress) - YIELD, (I6 @ stress) / 3 - 2e3])
+        assert (f <= 1e-8 * YIELD).all()
+        active = f >= -1e-7 * YIELD
+        normals = np.column_stack([DEV @ stress / shear / np.sqrt(2) + 0.2 / 3 * I6, I6 / 3]) * active
+        assert nnls(normals, flow)[1] <= 1e-8 * np.linalg.norm(flow) + 1e-15
+        seen.add(tuple(active.tolist()))
+    assert {(True, True), (True, False)} <= seen, seen
+
+
 def test_certificate_is_small_for_the_step_and_large_for_a_wrong_one():
     from fenchel.integrators.certificate import duality_gap
     from fenchel.integrators.update import packed_values
