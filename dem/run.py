@@ -6,9 +6,12 @@ The run file is the checkpoint: it is replaced atomically while the run goes on 
 from __future__ import annotations
 
 import json
+import signal
+import threading
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -19,13 +22,13 @@ from ..errors import InputError
 from .bodies import Assembly
 from .preparation import make_sample, material_of, preparation
 from .record import TriaxialRecord
-from .scene import Scene, read_scene
+from .scene import Grains, Scene, SceneSolve, TestPath, Wires, read_scene
 from .stepping import Solver
 from .storage import load_run, save_run
 from .triaxial import TriaxialTest
 
 __all__ = [
-    "Progress", "Stage", "finished_test", "load_record", "record_content", "record_of", "run_scene", "run_stages", "walk",
+    "Progress", "Stage", "finished_test", "load_record", "record_content", "record_of", "run_scene", "run_stages", "triaxial_stage", "walk",
 ]  # fmt: skip
 
 
@@ -66,11 +69,44 @@ def walk(
     checkpoint: Callable[[], None] | None = None,
     every: float = 30.0,
 ) -> None:
-    """Advance a stage to its end; `share` is its part of the whole for the bar, `every` [s] the pace of checkpoints."""
+    """Advance a stage to its end; `share` is its part of the whole for the bar, `every` [s] the pace of checkpoints.
+
+    An interrupt from the keyboard is taken between two steps: checkpoint, then `KeyboardInterrupt`.
+    """
+    with _interrupts() as stopped:
+        _walk(stage, share, progress, checkpoint, every, stopped)
+
+
+@contextmanager
+def _interrupts() -> Iterator[list[bool]]:
+    """A list that is no longer empty once the user has pressed Ctrl-C (in the main thread; elsewhere Python raises as ever)."""
+    pressed: list[bool] = []
+    if threading.current_thread() is not threading.main_thread():
+        yield pressed
+        return
+    before = signal.signal(signal.SIGINT, lambda *_: pressed.append(True))
+    try:
+        yield pressed
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _walk(
+    stage: Stage,
+    share: tuple[float, float],
+    progress: Callable[[Progress], None] | None,
+    checkpoint: Callable[[], None] | None,
+    every: float,
+    stopped: list[bool],
+) -> None:
     shown = 0.0
     saved = time.monotonic()
     while not stage.done:
         measures = stage.advance()
+        if stopped:
+            if checkpoint is not None:
+                checkpoint()
+            raise KeyboardInterrupt
         now = time.monotonic()
         if progress is not None and now - shown > 0.25:
             shown = now
@@ -173,6 +209,33 @@ def finished_test(assembly: Assembly, stage: Stage, seed: int) -> dict[str, Any]
     return {"record": record_content(stage.record(seed=seed, settings={})), "assembly": assembly.arrays()}
 
 
+def triaxial_stage(
+    assembly: Assembly,
+    grains: Grains,
+    wires: Wires | None,
+    path: TestPath,
+    solve: SceneSolve,
+    pressure: float,
+    *,
+    linked: bool = True,
+) -> TriaxialTest:
+    """The test of an assembly at rest at `pressure` [Pa]; `linked` False is the control with the same beads unlinked."""
+    law = material_of(grains, wires)
+    return TriaxialTest(
+        assembly,
+        replace(law, links=law.links and linked),
+        Solver(tolerance=solve.tolerance, sweep_limit=solve.sweep_limit),
+        pressure=pressure,
+        density=grains.density,
+        strain_path=path.strain_path,
+        inertial_number=path.inertial_number,
+        step_fraction=solve.step,
+        sphere=path.sphere,
+        frame_strain=path.frame_strain,
+        prestressed=wires is not None and wires.state == "prestressed",
+    )
+
+
 def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
     """Makers of the stages of a scene: a stage is made when its turn comes, from the assembly as it is then."""
 
@@ -182,20 +245,7 @@ def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
         )[k]
 
     def test(assembly: Assembly) -> Stage:
-        t = scene.triaxial
-        return TriaxialTest(
-            assembly,
-            material_of(scene.grains, scene.wires),
-            Solver(tolerance=scene.solve.tolerance, sweep_limit=scene.solve.sweep_limit),
-            pressure=t.pressure,
-            density=scene.grains.density,
-            strain_path=t.strain_path,
-            inertial_number=t.inertial_number,
-            step_fraction=scene.solve.step,
-            sphere=t.sphere,
-            frame_strain=t.frame_strain,
-            prestressed=scene.wires is not None and scene.wires.state == "prestressed",
-        )
+        return triaxial_stage(assembly, scene.grains, scene.wires, scene.triaxial, scene.solve, scene.triaxial.pressure)
 
     dummy = Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1), np.ones(3))
     count = len(preparation(dummy, scene.grains, scene.wires, scene.sample, scene.solve, scene.triaxial.pressure))

@@ -20,6 +20,7 @@ __all__ = [
     "Scene",
     "SceneSolve",
     "SceneTriaxial",
+    "TestPath",
     "Wires",
     "check_scene",
     "read_scene",
@@ -76,21 +77,27 @@ class Sample(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tr
     ] = 1e-4
 
 
-class SceneTriaxial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
-    """The triaxial test: lateral walls keep the pressure, the axial ones follow a strain path."""
+class TestPath(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """What every triaxial test says: lateral walls keep the pressure, the axial ones follow a strain path."""
 
-    pressure: Annotated[float, _key("confining pressure", "Pa")] = 5e4
+    __test__ = False  # no test of pytest
+
     strain_path: Annotated[
         tuple[float, ...], _key("logarithmic axial strains to visit, tension positive, first 0", "1")
-    ] = (
-        0.0,
-        -0.01,
-    )
+    ] = (0.0, -0.01)
     inertial_number: Annotated[float, _key("I = ε̇ d √(ρ/P), sets the rate", "1", gt=0, le=0.1)] = 5e-4
     sphere: Annotated[float, _key("radius of the measuring sphere over the half width of the box", "1", gt=0, le=1)] = (
         0.8
     )
-    frame_strain: Annotated[float, _key("axial strain between stored frames", "1", gt=0)] = 1e-4
+    frame_strain: Annotated[
+        float, _key("axial strain between stored frames (a quarter of it at the start)", "1", gt=0)
+    ] = 1e-4
+
+
+class SceneTriaxial(TestPath, frozen=True, kw_only=True, forbid_unknown_fields=True):
+    """The triaxial test of a scene."""
+
+    pressure: Annotated[float, _key("confining pressure", "Pa")] = 5e4
 
 
 class SceneSolve(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -139,6 +146,8 @@ def parse_toml(data: bytes, kind: type[Kind], name: str) -> Kind:
         key = place.rstrip("`").lstrip(".") or "top level"
         if "unknown field" in what:
             what += f"; allowed: {', '.join(_fields_at(kind, key))}"
+        if "enum value" in what:
+            what += f"; allowed: {', '.join(_values_at(kind, key))}"
         raise InputError(f"{name}: {key}: {what[:1].lower()}{what[1:]}") from None
     except (msgspec.DecodeError, UnicodeDecodeError, ValueError) as error:
         raise InputError(f"{name}: not valid TOML ({error}): see the file format page for an example") from None
@@ -152,6 +161,14 @@ def _fields_at(kind: Any, key: str) -> list[str]:
             info = next((_bare(f.type) for f in info.fields if f.encode_name == part), info)
     info = _bare(info)
     return [f.encode_name for f in info.fields] if isinstance(info, msgspec.inspect.StructType) else []
+
+
+def _values_at(kind: Any, key: str) -> list[str]:
+    """The words allowed at a dotted place of a struct type."""
+    info = msgspec.inspect.type_info(kind)
+    for part in key.split("."):
+        info = _bare(next(f.type for f in _bare(info).fields if f.encode_name == part))
+    return [str(value) for value in getattr(info, "values", ())]
 
 
 def _bare(info: Any) -> Any:

@@ -82,20 +82,6 @@ def _take(group: Any) -> dict[str, Any]:
     return out
 
 
-def _digest(value: Any) -> str:
-    """Hash of a nested dictionary: a damaged number must not pass for a result."""
-    hashed = hashlib.sha256()
-    if isinstance(value, dict):
-        for key in sorted(value):
-            hashed.update(f"{key}={_digest(value[key])};".encode())
-    elif isinstance(value, np.ndarray):
-        hashed.update(f"{value.dtype.str}{value.shape}".encode())
-        hashed.update(np.ascontiguousarray(value).tobytes())
-    else:
-        hashed.update(repr(value.item() if hasattr(value, "item") else value).encode())
-    return hashed.hexdigest()
-
-
 def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]) -> None:
     """Write a nested dictionary of arrays, numbers and strings as one HDF5 file, with the settings and versions that made it."""
     import h5py
@@ -109,10 +95,14 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
             "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
         )
         file.attrs["settings"] = json.dumps(settings, sort_keys=True)
-        file.attrs["digest"] = _digest(content | {"settings": file.attrs["settings"]})
         for key, value in content.items():
             _put(file, key, value)
-    replace_file(path, image.getvalue())
+    data = image.getvalue()
+    replace_file(path, data + _SEAL + hashlib.sha256(data).digest())
+
+
+# behind the HDF5 image, where other programs do not look: a damaged number must not pass for a result
+_SEAL = b"fenchel-sha256-v1 "
 
 
 def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
@@ -120,31 +110,25 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
     import h5py
 
     path = Path(path)
+    tail = len(_SEAL) + hashlib.sha256().digest_size
     try:
-        with h5py.File(path, "r") as file:
-            if "settings" not in file.attrs:
-                raise InputError(
-                    f"{path}: not a run file of fenchel (no settings in it): give a file written by `fenchel dem`"
-                )
-            if int(file.attrs["format"]) != FORMAT:
-                raise InputError(
-                    f"{path}: format {file.attrs['format']} is not {FORMAT}: run it again with this version"
-                )
-            content = _take(file)
-        for name in ("format", "program", "python", "conventions"):
-            content.pop(name, None)
-        digest = content.pop("digest", None)
-        if digest is None:
-            raise InputError(f"{path}: has no checksum: written by an earlier version, or damaged: run it again")
-        if digest != _digest(content):
-            raise InputError(f"{path}: damaged run file (its content does not match its checksum): run it again")
-        settings = json.loads(content.pop("settings"))
-    except InputError:
-        raise
+        whole = path.read_bytes()
     except FileNotFoundError:
         raise InputError(f"{path}: no such run file: check the name") from None
-    except Exception as error:
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read ({error.strerror or error}): check the name") from None
+    data, seal = whole[:-tail], whole[-tail:]
+    if seal != _SEAL + hashlib.sha256(data).digest():
         raise InputError(
-            f"{path}: unreadable or truncated run file ({(str(error) or type(error).__name__).splitlines()[0]}): run it again"
-        ) from None
+            f"{path}: unreadable or truncated run file (its checksum is missing or does not match): remove it and run again"
+        )
+    with h5py.File(io.BytesIO(data), "r") as file:
+        if file.attrs["format"] != FORMAT:
+            raise InputError(
+                f"{path}: format {file.attrs['format']} is not {FORMAT}: remove it and run again with this version"
+            )
+        content = _take(file)
+    settings = json.loads(content.pop("settings"))
+    for name in ("format", "program", "python", "conventions"):
+        content.pop(name)
     return content, settings

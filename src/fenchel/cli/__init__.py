@@ -57,5 +57,6 @@ def main(arguments: list[str] | None = None) -> int:
         line, code = one_line(problem)
         print(line, file=sys.stderr)
     except KeyboardInterrupt:
+        print("fenchel: stopped; finished runs and checkpoints are kept", file=sys.stderr)
         code = 130
     return code if isinstance(code, int) else 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+import sys
 import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
@@ -23,7 +24,7 @@ from .options import Specimen
 from .report import write_report
 from .runs_info import RunsInfo, SampleView, quality_rows, series_of
 from .study import Study, demo_study, read_study
-from .tasks import Prepare, Probe, Test, probes_of
+from .tasks import Prepare, Probe, Test, awaited_by, probes_of
 
 __all__ = ["run_study"]
 
@@ -70,6 +71,8 @@ def run_study(
         results = _run([*tests, *probes], jobs, bars)
         clock["tests"] = time.perf_counter()
     records: list[TriaxialRecord] = results[: len(tests)]
+    if show:
+        print("fitting the law, then writing the report", file=sys.stderr, flush=True)
     identification = identify_law(_specimens(tests, records), study.options())
     clock["identification"] = time.perf_counter()
     info = _runs_info(study, prepare[0], tests, records, results[len(tests) :], clock)
@@ -114,14 +117,15 @@ def _run(tasks: Sequence[Task], jobs: int, bars: Bars) -> list[Any]:
 
     order = sorted(range(len(tasks)), key=lambda k: -tasks[k].cost)
     out: list[Any] = [None] * len(tasks)
-    calls = (delayed(_call)(k, tasks[k]) for k in order)
-    for k, result in Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch="all")(calls):
+    calls = (delayed(_call)(k, tasks[k], os.getpid()) for k in order)
+    for k, result in Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)(calls):
         out[k] = result
         bars.finished(tasks[k])
     return out
 
 
-def _call(index: int, task: Callable[[], Any]) -> tuple[int, Any]:
+def _call(index: int, task: Callable[[], Any], caller: int) -> tuple[int, Any]:
+    awaited_by(caller)
     return index, task()
 
 

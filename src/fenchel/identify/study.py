@@ -13,6 +13,7 @@ from ..dem.scene import (
     Grains,
     Sample,
     SceneSolve,
+    TestPath,
     Wires,
     check_bodies,
     check_finite,
@@ -33,24 +34,14 @@ def _key(text: str, unit: str, **bounds: Any) -> Meta:
     return Meta(description=text, extra_json_schema={"unit": unit}, **bounds)
 
 
-class StudyTriaxial(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
+class StudyTriaxial(TestPath, frozen=True, kw_only=True, forbid_unknown_fields=True):
     """The tests: one per pressure and seed, with links and, as the control, without."""
 
     pressures: Annotated[tuple[float, ...], _key("confining pressures that are fitted", "Pa")] = (5e4, 7e4, 9e4)
     held_out: Annotated[tuple[float, ...], _key("confining pressures that are predicted, not fitted", "Pa")] = (6e4,)
     strain_path: Annotated[
         tuple[float, ...], _key("logarithmic axial strains to visit, tension positive, first 0", "1")
-    ] = (
-        0.0,
-        -0.01,
-        0.006,
-        -0.01,
-    )
-    inertial_number: Annotated[float, _key("I = ε̇ d √(ρ/P), sets the rate", "1", gt=0, le=0.1)] = 5e-4
-    sphere: Annotated[float, _key("radius of the measuring sphere over the half width of the box", "1", gt=0, le=1)] = (
-        0.8
-    )
-    frame_strain: Annotated[float, _key("axial strain between stored frames", "1", gt=0)] = 1e-4
+    ] = (0.0, -0.01, 0.006, -0.01)
 
 
 class StudySolve(SceneSolve, frozen=True, kw_only=True, forbid_unknown_fields=True):

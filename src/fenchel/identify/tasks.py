@@ -19,21 +19,34 @@ import numpy as np
 from ..dem.bodies import Assembly
 from ..dem.preparation import IsotropicStage, make_sample, material_of, preparation, pressure_change
 from ..dem.record import TriaxialRecord
-from ..dem.run import Progress, Stage, finished_test, record_of, run_stages
+from ..dem.run import Progress, Stage, finished_test, record_of, run_stages, triaxial_stage
 from ..dem.stepping import Drive, Material, Simulation, Solver
 from ..dem.storage import load_run
 from ..dem.triaxial import TriaxialTest, inertial_time
 from ..errors import InputError
+from .curves import curves
+from .elastic import elastic_moduli
 from .study import Study
 
-__all__ = ["Prepare", "Probe", "Test", "probes_of", "progress_file", "read_progress"]
+__all__ = ["Prepare", "Probe", "Test", "awaited_by", "probes_of", "progress_file", "read_progress"]
 
 
 def _report(place: Path, progress: Progress) -> None:
-    """Leave the present progress in a file, whole or not at all."""
+    """Leave the present progress in a file, whole or not at all; whoever waits for it gone, stop: the checkpoint stays."""
+    if _awaited and os.getppid() not in _awaited:
+        os._exit(1)
     part = place.with_suffix(".part")
     part.write_bytes(msgspec.json.encode(progress))
     os.replace(part, place)
+
+
+_awaited: set[int] = set()
+
+
+def awaited_by(process: int) -> None:
+    """Tie the work of this process to another one: when that is gone, a task stops at its next report."""
+    if process != os.getpid():
+        _awaited.add(process)
 
 
 def read_progress(place: Path) -> Progress | None:
@@ -163,7 +176,6 @@ class Test:
     def __call__(self) -> TriaxialRecord:
         """Run or go on with the test; returns its record."""
         study, t = self.study, self.study.triaxial
-        law = material_of(study.grains, study.wires)
         settings = _settings(study, seed=self.seed, pressure=self.pressure, linked=self.linked) | {
             "pressures": [p for p in study.pressures if p <= self.pressure],
             "triaxial": {
@@ -174,21 +186,15 @@ class Test:
             },
         }
 
-        def test(assembly: Assembly) -> Stage:
-            return TriaxialTest(
-                assembly,
-                replace(law, links=law.links and self.linked),
-                Solver(tolerance=study.solve.tolerance, sweep_limit=study.solve.sweep_limit),
-                pressure=self.pressure,
-                density=study.grains.density,
-                strain_path=t.strain_path,
-                inertial_number=t.inertial_number,
-                step_fraction=study.solve.step,
-                sphere=t.sphere,
-                frame_strain=t.frame_strain,
-                prestressed=study.wires is not None and study.wires.state == "prestressed",
-            )
-
+        test = partial(
+            triaxial_stage,
+            grains=study.grains,
+            wires=study.wires,
+            path=t,
+            solve=study.solve,
+            pressure=self.pressure,
+            linked=self.linked,
+        )
         content = run_stages(
             [test],
             partial(_load_state, Prepare(study, self.seed, self.folder).state_file(self.pressure)),
@@ -260,6 +266,8 @@ class Probe:
         q = record.wall_stress[:, 2] - 0.5 * (record.wall_stress[:, 0] + record.wall_stress[:, 1])
         strain = -record.axial_strain
 
+        sphere = elastic_moduli([curves(record.history())], replace(study.options(), window_wire=5e-4)).E_s
+
         def secant(level: float) -> float:
             return float(-(np.interp(level, strain, q) - q[0]) / level / 1e6)
 
@@ -268,6 +276,7 @@ class Probe:
             "tolerance": self.tolerance,
             "sweeps a step": record.quality["sweeps_mean"],
             "inertial time / step": record.quality["inertial_time_over_step"],
+            "E_s in the sphere [MPa]": sphere / 1e6,
             "E_s at 0.02 % [MPa]": secant(2e-4),
             "E_s at 0.05 % [MPa]": secant(5e-4),
             "natural map": record.quality["natural_map_median"],
