@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Add, Dummy, Expr, Float, Mul, Poly, PolynomialError, expand
+from sympy import Add, Dummy, Expr, Float, Mul, Poly, PolynomialError, S, expand
 
-from ..errors import DeclarationError
+from ..errors import DeclarationError, InputError
 from ..potentials import Law, unilateral_energy
 from ..potentials.derivative import invariants_of
 from ..potentials.invariants import InnerLeaf, NormLeaf, PositiveSquareLeaf, TraceLeaf
@@ -171,6 +171,7 @@ def flow_atoms(law: Law, values: Mapping[str, float]) -> FlowAtoms:
         rule = f"law '{law.name}', inequality {j + 1} of phi_star"
         cones: list[tuple[float, np.ndarray]] = []
         rest: list[Expr] = []
+        weights: dict[NormLeaf, Expr] = {}
         for term in Add.make_args(expand(function)):
             found = [a for a in Mul.make_args(term) if isinstance(a, NormLeaf)]
             if not found:
@@ -179,12 +180,14 @@ def flow_atoms(law: Law, values: Mapping[str, float]) -> FlowAtoms:
             weight = Mul(*(a for a in Mul.make_args(term) if a not in found))
             if len(found) > 1 or invariants_of(weight) or weight.free_symbols & set(places):
                 raise DeclarationError(f"{rule}: {term} is not affine in norms of forces")
+            weights[found[0]] = weights.get(found[0], S.Zero) + weight
+        for leaf, weight in weights.items():
             value = frame.number(weight)
-            matrix, shift = frame.tensor(found[0].args[0])  # type: ignore[arg-type]
-            if value < 0:
-                raise DeclarationError(f"{rule}: the norm in {term} has the negative weight {value:g}; f is not convex")
+            matrix, shift = frame.tensor(leaf.args[0])  # type: ignore[arg-type]
             if shift.any():
                 raise DeclarationError(f"{rule}: a constant tensor inside a norm has no conic form here")
+            if value < 0:
+                raise InputError(f"{rule}: {leaf} has the negative weight {weight} = {value:g}; f is not convex")
             cones.append((value, matrix))
         row, shift0 = frame.affine(Add(*rest), rule)
         linear.append(row)

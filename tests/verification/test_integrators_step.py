@@ -11,6 +11,7 @@ from sympy import sqrt, tan
 from fenchel.errors import InputError
 from fenchel.integrators.atoms import energy_atoms, flow_atoms
 from fenchel.integrators.conic import declare
+from fenchel.integrators.update import packed_values
 from fenchel.potentials import (
     Law,
     dev,
@@ -357,9 +358,19 @@ def test_two_intersecting_surfaces_satisfy_the_optimality_conditions():
     assert {(True, True), (True, False)} <= seen, seen
 
 
+def test_a_weight_that_is_a_difference_is_judged_by_its_value():
+    surface = (a - 1) * norm(dev(A)) + norm(A) - C
+    law = Law("split", psi=ELASTIC, phi_star=indicator(surface), observable=eps, internal=(eps_p,))
+    update = law.compile(tangent=False)
+    values = dict(E=12e6, nu=0.2, C=YIELD)
+    stress = update([1e-3, 0, 0, 0, 0, 0], None, **values, a=2.0).stress[0]
+    assert np.linalg.norm(DEV @ stress) + np.linalg.norm(stress) == pytest.approx(YIELD, rel=1e-9)
+    with pytest.raises(InputError, match="negative weight"):
+        update([1e-3, 0, 0, 0, 0, 0], None, **values, a=0.5)
+
+
 def test_certificate_is_small_for_the_step_and_large_for_a_wrong_one():
     from fenchel.integrators.certificate import duality_gap
-    from fenchel.integrators.update import packed_values
 
     rng = np.random.default_rng(5)
     strains = random_strains(rng, 100)
@@ -403,7 +414,10 @@ def test_softening_that_hides_off_the_diagonal_is_refused(solver, energy, intern
     surface += sum((f for v, f in ((s1, R1), (s2, R2)) if v in internal), 0)
     law = Law("hidden", psi=ELASTIC + energy, phi_star=indicator(surface), observable=eps, internal=internal)
     update = law.compile(solver=solver, tangent=False)
-    update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good)
+    if solver == "conic":
+        update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good)
+    else:
+        packed_values(update, NUMBERS | good)  # what a call does first; spares a compilation
     with pytest.raises(InputError, match=r"convex.*softening is not modelled") as caught:
         update([1e-3, -1e-3, 0, 0, 0, 0], None, **NUMBERS, **good | bad)
     assert "\n" not in str(caught.value)
@@ -417,7 +431,10 @@ def test_values_that_break_convexity_of_an_unbounded_parameter_are_refused(solve
     law = Law("loose", psi=ELASTIC + wires, phi_star=indicator(a * norm(dev(A)) - C), observable=eps, internal=(eps_p,))
     good = dict(E=12e6, nu=0.2, C=YIELD, a=1.0, b=1e5, c=1e5)
     update = law.compile(solver=solver, tangent=False)
-    update([1e-3, 1e-3, 0, 0, 0, 0], None, **good)
+    if solver == "conic":
+        update([1e-3, 1e-3, 0, 0, 0, 0], None, **good)
+    else:
+        packed_values(update, good)
     with pytest.raises(InputError) as caught:
         update([1e-3, 1e-3, 0, 0, 0, 0], None, **good | bad)
     assert "\n" not in str(caught.value)
