@@ -25,7 +25,7 @@ def _replay(found: Identification) -> list[str]:
     held = [p for p in linked if p.held_out]
     worst = max(fitted, key=lambda p: p.error_q)
     out = [
-        f"The law replays q on the fitted tests {_verdict(worst.error_q)}: rms error "
+        f"The law replays the deviator stress q = σ_r − σ_z of the fitted tests {_verdict(worst.error_q)}: rms error "
         f"{np.mean([p.error_q for p in fitted]):.1%} of max|q| on average, {worst.error_q:.1%} at worst "
         f"({worst.pressure / 1e3:g} kPa, seed {worst.seed})."
     ]
@@ -34,22 +34,46 @@ def _replay(found: Identification) -> list[str]:
         out.append(
             f"It predicts the held-out pressure{'s' if len(found.held_out) > 1 else ''} "
             f"{', '.join(f'{level / 1e3:g}' for level in found.held_out)} kPa {_verdict(worst.error_q)}: "
-            f"{np.mean([p.error_q for p in held]):.1%} on average, {worst.error_q:.1%} at worst."
+            f"{np.mean([p.error_q for p in held]):.1%} on average, {worst.error_q:.1%} at worst{_between(found)}."
         )
     else:
         out.append("No pressure was held out: nothing here tests the law on data it has not seen.")
     side = float(np.mean([p.error_lateral for p in linked]))
     data = float(np.mean([p.volume_end for p in linked]))
     model = float(np.mean([p.volume_end_law for p in linked]))
+    last = [(float(p.volume_strain[-1]), float(p.volume_strain_law[-1])) for p in linked]
+    end, end_law = np.mean(last, axis=0)
     text = (
         f"The lateral strain, which is not fitted, is off by {side:.1%} of its maximum (rms); volume strain at the end of the "
-        f"first leg: grains {data:+.2%}, law {model:+.2%}"
+        f"first leg: grains {data:+.2%}, law {model:+.2%}; at the end of the path: grains {end:+.2%}, law {end_law:+.2%}"
     )
     opposite = data < 0.0 < model
     out.append(
         text
         + (" — the wrong sign: associated flow dilates from first yield, the grains contract." if opposite else ".")
     )
+    return out
+
+
+def _between(found: Identification) -> str:
+    """Says whether the held-out pressures are interpolated."""
+    inside = all(min(found.fitted) < level < max(found.fitted) for level in found.held_out)
+    return " (it lies between the fitted ones)" if inside else " (beyond the fitted ones)"
+
+
+def _yield(found: Identification) -> list[str]:
+    """What the joint fit made of friction and cohesion, where it cannot be taken at its word."""
+    out = []
+    theta, cohesion = found.estimates.get("theta_f"), found.estimates.get("C_0")
+    if theta is not None and theta.low is not None and theta.low <= 0.0 < theta.value:
+        out.append(
+            f"θ_f = {theta.value:.3f} rad of the joint fit is not clear of zero (interval up to {theta.high:.3f} rad)."
+        )
+    if cohesion is not None and cohesion.value > 0.0:
+        out.append(
+            f"C_0 = {cohesion.value / 1e3:.3g} kPa is no cohesion of the grains (those of fenchel have none): it is where the straight "
+            "line of the law through a curved onset of yield meets zero pressure."
+        )
     return out
 
 
@@ -64,7 +88,7 @@ def _hardening(found: Identification) -> list[str]:
             "resumes."
         ]
     out = [f"H_k and H_i are separable: condition number {hard.joint.condition:.2g} (limit {limit:g})."]
-    out += [f"{name} came out at its lower bound." for name in hard.joint.at_bound]
+    out += [f"{name} came out at its lower bound: the data want less than none of it." for name in hard.joint.at_bound]
     staged, joint = hard.staged, hard.joint
     out.append(
         f"Misfit of q: {staged.misfit:.1%} with the staged values, {joint.misfit:.1%} after the joint refinement."
@@ -132,7 +156,7 @@ def _wires(found: Identification) -> list[str]:
 
 def findings(found: Identification) -> tuple[str, ...]:
     """Sentences for the head of the report."""
-    out = [*_replay(found), *_hardening(found), *_elastic(found), *_wires(found)]
+    out = [*_replay(found), *_yield(found), *_hardening(found), *_elastic(found), *_wires(found)]
     ends = [m for m in found.mismatches if m.linked and np.isfinite(m.end_of_first_leg)]
     if ends:
         value = float(np.mean([m.end_of_first_leg for m in ends]))
