@@ -137,9 +137,13 @@ def _wires(found: Identification) -> list[str]:
         if c.wire_stress_max == 0.0
         else f"The control carries link stress up to {c.wire_stress_max:.3g} Pa: it is not unlinked."
     )
-    # the sphere strains less than the box: the largest strain that it reached
-    reached = [x for x in found.options.strength_strains if any(k.startswith(f"q@{x:g}@") for k in c.difference)]
-    strain = max(reached, default=0.0)
+
+    # the sphere strains less than the box: the largest strain that every sample reached at every pressure
+    def whole(strain: float) -> bool:
+        found_there = [c.difference.get(f"q@{strain:g}@{level:g}") for level in found.fitted]
+        return all(d is not None and np.all(np.isfinite(d.seed_values)) for d in found_there)
+
+    strain = max((x for x in found.options.strength_strains if whole(x)), default=0.0)
     marked = [c.difference[k] for k in c.difference if k.startswith(f"q@{strain:g}@")]
     parts = [
         f"{d.value / 1e3:+.2f} ({d.low / 1e3:+.2f} to {d.high / 1e3:+.2f}) at {float(d.name.split('@')[2]) / 1e3:g} kPa"

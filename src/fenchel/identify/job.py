@@ -189,11 +189,12 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
     key = "E_s at 0.02 % [MPa]"
     own = [row[key] for row in probes if row["grains"] == "compliant"]
     rigid = [row[key] for row in probes if row["grains"] == "rigid"]
+    inside = [row["E_s in the sphere [MPa]"] for row in probes if row["grains"] == "compliant"]
     parts = []
     if own:
         parts.append(
-            f"With the grains of the study E_s moves by {100 * (max(own) - min(own)) / own[0]:.2g} % "
-            "at half the tolerance and half the step."
+            f"With the grains of the study the secant moves by {100 * (max(own) - min(own)) / own[0]:.2g} % at half the tolerance "
+            f"and half the step, the E_s of the sphere by {100 * (max(inside) - min(inside)) / inside[0]:.2g} %."
         )
     if rigid:
         parts.append(
@@ -202,6 +203,6 @@ def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:
         )
     if parts:
         parts.append(
-            "Secants of wall stress over box strain; the E_s of the law is read inside the sphere, which is stiffer than the box."
+            "Secants are wall stress over box strain; the E_s of the law is read inside the sphere, which is stiffer than the box."
         )
     return " ".join(parts)
