@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, canvas, colours, legend_below, styled
+from .figure_style import FAINT, INK, WALKED, canvas, colours, legend_below, styled, walked
 from .identification import Identification
 from .runs_info import Series
 
@@ -82,7 +82,7 @@ def residual_figure(series: Sequence[Series]) -> Any:
         for s in series:
             if name in s.values:
                 data = np.maximum(np.asarray(s.values[name], float), 1e-16)
-                x = np.arange(len(data)) / max(len(data) - 1, 1) * 100.0
+                x = walked(s.axial_strain)
                 axis.semilogy(
                     x,
                     data,
@@ -92,7 +92,7 @@ def residual_figure(series: Sequence[Series]) -> Any:
                     alpha=0.9 if s.linked else 0.5,
                 )
         axis.set_title(_RESIDUALS[name])
-    axes[-1, 0].set_xlabel("frames of the test [%]")
+    axes[-1, 0].set_xlabel(WALKED)
     from matplotlib.lines import Line2D
 
     handles = [Line2D([], [], color=c) for c in tints.values()] + [Line2D([], [], color=INK, linestyle="--", alpha=0.5)]
@@ -116,10 +116,10 @@ def energy_figure(series: Series) -> Any:
             continue
         data = np.asarray(values[name], float)
         data = data - data[0] if name in ("elastic", "kinetic") else data
-        x = np.arange(len(data)) / max(len(data) - 1, 1) * 100.0
+        x = walked(series.axial_strain)
         axis.plot(x, factor * data, "--" if name == "balance" else "-", color=colour, linewidth=1.0, label=label)
     axis.axhline(0.0, color=FAINT, linewidth=0.5)
-    axis.set(xlabel="frames of the test [%]", ylabel=f"energy [{unit}]")
+    axis.set(xlabel=WALKED, ylabel=f"energy [{unit}]")
     links = "links on" if series.linked else "beads unlinked"
     axis.set_title(f"seed {series.seed}, {series.pressure / 1e3:g} kPa, {links}")
     handles, labels = axis.get_legend_handles_labels()

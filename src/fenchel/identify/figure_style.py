@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["SIGNS", "Signs", "canvas", "colours", "legend_below", "picture", "styled"]
+__all__ = ["SIGNS", "WALKED", "Signs", "canvas", "colours", "legend_below", "picture", "styled", "walked"]
 
 Array = NDArray[np.float64]
 SIGNS = ("tension-positive", "compression-positive")
@@ -46,6 +46,15 @@ _STYLE: dict[Any, Any] = {
 }
 
 
+WALKED = "axial strain walked [%]"
+
+
+def walked(axial_strain: Array) -> Array:
+    """Length of the strain path up to each frame [%], shape (frame_count,): an abscissa that does not turn at a reversal."""
+    steps = np.abs(np.diff(axial_strain))
+    return 100.0 * np.concatenate([[0.0], np.cumsum(steps)])
+
+
 @dataclass(frozen=True)
 class Signs:
     """Sign convention of the axes: the factor on strains and direct stresses, and the words for the labels."""
@@ -74,7 +83,7 @@ class Signs:
     def volume(self) -> str:
         """Label of the volume strain."""
         word = "dilation" if self.factor > 0 else "contraction"
-        return f"volume {self._eps('v')} [%] ({word} +)"
+        return f"volume strain {self._eps('v')} [%] ({word} +)"
 
     @property
     def lateral(self) -> str:

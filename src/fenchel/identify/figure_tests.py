@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, Signs, canvas, colours, legend_below, styled
+from .figure_style import FAINT, INK, WALKED, Signs, canvas, colours, legend_below, styled, walked
 from .identification import Identification
 from .prediction import Prediction
 
@@ -106,7 +106,7 @@ def fit_figure(found: Identification, signs: Signs) -> Any:
             first = tests[0]
             axis.plot(signs.percent(first.axial_strain), first.q_law / 1e3, "--", color=INK, linewidth=1.0)
             errors = ", ".join(f"{p.error_q:.1%}" for p in tests)
-            axis.text(0.98, 0.04, f"error {errors}", transform=axis.transAxes, ha="right", fontsize=8, color=INK)
+            axis.set_title(f"{axis.get_title()}; error {errors}")
         axis.set(xlabel=signs.axial, ylabel=r"$q=\sigma_r-\sigma_z$ [kPa]")
     _below(
         figure,
@@ -178,7 +178,7 @@ def mismatch_figure(found: Identification, signs: Signs) -> Any:
     for m in found.mismatches:
         if m.seed != seed:
             continue
-        x = np.arange(len(m.value)) / max(len(m.value) - 1, 1) * 100.0
+        x = walked(m.axial_strain)
         axis.plot(
             x,
             m.value,
@@ -196,7 +196,7 @@ def mismatch_figure(found: Identification, signs: Signs) -> Any:
                 alpha=0.15,
                 lw=0,
             )
-    axis.set(xlabel="frames of the test [%]", ylabel=r"$\|\varepsilon_s-\varepsilon_w\|/\|\varepsilon_s\|$ [-]")
+    axis.set(xlabel=WALKED, ylabel=r"$\|\varepsilon_s-\varepsilon_w\|/\|\varepsilon_s\|$ [-]")
     axis.set_ylim(bottom=0.0)
     axis.set_title(f"seed {seed}; band: one octant deviation; gaps: strain too small")
     entries = [(f"{level / 1e3:g} kPa", {"color": tints[level]}) for level in _levels(found)]
