@@ -106,7 +106,7 @@ def fit_figure(found: Identification, signs: Signs) -> Any:
             first = tests[0]
             axis.plot(signs.percent(first.axial_strain), first.q_law / 1e3, "--", color=INK, linewidth=1.0)
             errors = ", ".join(f"{p.error_q:.1%}" for p in tests)
-            axis.set_title(f"{axis.get_title()}; error {errors}")
+            axis.set_title(f"{axis.get_title(loc='left')}; error {errors}")
         axis.set(xlabel=signs.axial, ylabel=r"$q=\sigma_r-\sigma_z$ [kPa]")
     _below(
         figure,

@@ -19,6 +19,11 @@ def _verdict(error: float) -> str:
     return "closely" if error < GOOD else "roughly" if error < POOR else "BADLY"
 
 
+def _kilo(pascal: float) -> str:
+    """A stress in kPa; what is below one Pa is none."""
+    return f"{pascal / 1e3:.3g}" if pascal >= 1.0 else "0"
+
+
 def _replay(found: Identification) -> list[str]:
     linked = [p for p in found.predictions if p.linked]
     fitted = [p for p in linked if not p.held_out]
@@ -103,8 +108,8 @@ def _hardening(found: Identification) -> list[str]:
     if shift > 0.2:
         first, whole = staged.parameters, joint.parameters
         out.append(
-            f"Yield read from the first leg (θ_f = {first.theta_f:.3f} rad, C_0 = {first.C_0 / 1e3:.3g} kPa) and from the "
-            f"whole path ({whole.theta_f:.3f} rad, {whole.C_0 / 1e3:.3g} kPa) disagree: one linearly hardening surface "
+            f"Yield read from the first leg (θ_f = {first.theta_f:.3f} rad, C_0 = {_kilo(first.C_0)} kPa) and from the "
+            f"whole path ({whole.theta_f:.3f} rad, {_kilo(whole.C_0)} kPa) disagree: one linearly hardening surface "
             "does not follow both."
         )
     return out

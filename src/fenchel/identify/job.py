@@ -156,14 +156,9 @@ def _runs_info(
     content, _ = load_run(prepared.state_file(study.pressures[0]))
     assembly = Assembly.from_arrays(content["assembly"])
     stamps = list(clock.items())
-    whole: dict[str, Any] = msgspec.to_builtins(study)
-    flat = {
-        f"{table}.{key}": value
-        for table, keys in whole.items()
-        for key, value in (keys.items() if isinstance(keys, dict) else {"": keys}.items())
-    }
+    prestressed = study.wires is not None and study.wires.state == "prestressed" and study.wires.control
     return RunsInfo(
-        settings=flat,
+        settings=_with_units(study),
         seconds={name: now - before for (_, before), (name, now) in pairwise(stamps)},
         versions={
             "fenchel": __version__,
@@ -180,8 +175,31 @@ def _runs_info(
         quality=quality_rows(records),
         stiffness=probes,
         stiffness_note=_stiffness_note(probes),
+        notes=[
+            "The control of prestressed wires starts from the state at rest with links and rearranges when they are cut."
+        ]
+        if prestressed
+        else [],
         files=[str(t.run_file.relative_to(t.folder.parent)) for t in tests],
-    )  # fmt: skip
+    )
+
+
+def _with_units(study: Study) -> dict[str, Any]:
+    """Every setting of a study, "table.key [unit]": value."""
+    out: dict[str, Any] = {}
+    for name in study.__struct_fields__:
+        table = getattr(study, name)
+        if not isinstance(table, msgspec.Struct):
+            out[name] = "none" if table is None else table
+            continue
+        for field in msgspec.inspect.type_info(type(table)).fields:  # type: ignore[attr-defined]
+            unit = (getattr(field.type, "extra_json_schema", None) or {}).get("unit", "–")
+            value = getattr(table, field.name)
+            label = f"{name}.{field.name}" + ("" if unit in ("–", "1") else f" [{unit}]")
+            if value is None or isinstance(value, bool):
+                value = "–" if value is None else "yes" if value else "no"
+            out[label] = list(value) if isinstance(value, tuple) else value
+    return out
 
 
 def _stiffness_note(probes: Sequence[dict[str, Any]]) -> str:

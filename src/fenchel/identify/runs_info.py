@@ -90,7 +90,8 @@ def quality_notes(quality: Sequence[Mapping[str, Any]]) -> list[str]:
     if apart and max(apart) > 0.05:
         out.append(
             f"The stress inside the measuring sphere, from which the law is read, differs from that on the walls by up to {max(apart):.0%} "
-            "(next to a wall a layer carries less): pressures named here are those of the walls."
+            "(next to a wall a layer carries less): pressures named here are those of the walls, "
+            "also in the study's reading of the yield stress."
         )
     return out
 
