@@ -75,6 +75,32 @@ def test_love_weber_and_the_split_by_phase(rested: Assembly) -> None:
     )
 
 
+def test_the_sphere_takes_its_part_of_every_branch(rested: Assembly) -> None:
+    """Σ f ⊗ (part of the branch inside), the part by counting points along it."""
+    simulation = loaded(rested)
+    rows, a = simulation.contacts, simulation.assembly
+    assert rows is not None
+    radius = 0.6 * float(a.half.min())
+    t = (np.arange(4000) + 0.5) / 4000
+    expected = np.zeros((3, 3))
+
+    def add(start: np.ndarray, end: np.ndarray, force: np.ndarray) -> None:
+        points = start + t[:, None] * (end - start)
+        expected[:] += np.mean(np.sum(points**2, axis=1) < radius**2) * np.outer(force, end - start)
+
+    for (i, j), row in zip(rows.pair, rows.contact, strict=True):
+        force = row[3:6] / rows.step
+        if force.any():
+            point = rows.x[i] - (a.radius[i] + 0.5 * row[13]) * row[:3]
+            add(rows.x[i], point, force)
+            add(rows.x[j], point, -force)
+    for (i, j), row in zip(rows.link, rows.link_row, strict=True):
+        add(rows.x[i], rows.x[j], -row[3] / rows.step * row[:3])
+    # walls lie outside of this sphere
+    found = moments(a, rows, radius)[:, :8].sum(axis=(0, 1))
+    assert np.linalg.norm(found - expected) < 1e-3 * np.linalg.norm(expected)
+
+
 def test_part_of_a_segment_in_a_sphere() -> None:
     rng = np.random.default_rng(5)
     t = (np.arange(20_000) + 0.5) / 20_000

@@ -188,6 +188,18 @@ def test_wire_laws_pull_and_rods_push_too(strain: float) -> None:
         assert np.sign(p) == np.sign(strain)
 
 
+def test_prestrain_shifts_the_natural_length() -> None:
+    """T = k (d − (1+π) l₀)/l₀: a negative π pre-tensions, a positive one leaves the link slack."""
+    k, h = 40.0, 0.01
+    for prestrain in (-0.1, 0.1):
+        a = two_beads(0.5, 0.5, 0.0)
+        law = Material(wire_law="elastic_wire", wire_stiffness=k, prestrain=prestrain)
+        Simulation(a, law, Solver(tolerance=1e-14)).advance(h, Drive())
+        expected = max(0.0, h * k * (a.x[1, 0] - (1.0 + prestrain) * 0.5) / 0.5)
+        assert a.link_impulse[0] == pytest.approx(expected, rel=1e-12)
+        assert (a.link_impulse[0] > 0.0) == (prestrain < 0.0)
+
+
 def test_rigid_is_the_limit_of_elastic_at_rate_one_over_k() -> None:
     limit = tension(two_beads(0.6, 0.5, 0.2), "rigid_wire", 1.0)
     errors = [abs(tension(two_beads(0.6, 0.5, 0.2), "elastic_wire", k) - limit) for k in (1e6, 1e7, 1e8)]
