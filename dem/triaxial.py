@@ -21,9 +21,33 @@ from .homogenise import fit_sums, moments, wall_stress
 from .record import TriaxialRecord, mandel
 from .stepping import Drive, Material, Simulation, Solver
 
-__all__ = ["TriaxialTest", "inertial_time"]
+__all__ = ["QUALITY", "TriaxialTest", "inertial_time"]
 
 Array = NDArray[np.float64]
+
+QUALITY = {  # what `TriaxialRecord.quality` holds: unit and meaning
+    "inertial_number": ("1", "largest I = ε̇ t_i that was driven"),
+    "unbalanced_median": ("1", "mean net force of bodies / mean contact force, median over frames"),
+    "unbalanced_max": ("1", "the same, largest over all steps"),
+    "natural_map_median": ("1", "residual ‖p − P_K(p − ρû)‖/‖p‖ recomputed, median over frames"),
+    "natural_map_max": ("1", "the same, largest over all steps"),
+    "change_max": ("1", "largest relative impulse change at which sweeps stopped"),
+    "sweeps_mean": ("1", "sweeps a step"),
+    "violation_over_radius": ("1", "largest gap less elastic deflection / mean radius"),
+    "overlap_mean_over_radius": ("1", "mean overlap of closed contacts / mean radius"),
+    "overlap_max_over_radius": ("1", "largest overlap / mean radius"),
+    "kappa": ("1", "k_n/(P d), inf for rigid grains"),
+    "inertial_time_over_step": ("1", "t_i/h"),
+    "energy_error": ("1", "largest energy not accounted for / largest external work"),
+    "wall_box_difference": ("1", "wall stress against the homogenised stress of the box, largest over frames"),
+    "wall_sphere_difference": ("1", "the same for the measuring sphere"),
+    "solid_fraction": ("1", "grains and beads in the box"),
+    "grain_fraction": ("1", "grains alone"),
+    "bead_fraction": ("1", "beads alone"),
+    "wire_density": ("m⁻²", "wire length per volume of the box"),
+    "steps": ("1", "time steps"),
+    "contact_iterations": ("1", "rows times sweeps"),
+}
 
 _SUMMED = ("friction", "algorithmic", "shock", "external", "balance")
 _SERIES = (

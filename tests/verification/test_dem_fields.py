@@ -11,6 +11,7 @@ from fenchel.dem import Assembly, Drive, Material, Simulation, Solver, TriaxialR
 from fenchel.dem.homogenise import _inside, fit_sums, moments, wall_stress
 from fenchel.dem.preparation import make_sample, material_of, preparation
 from fenchel.dem.scene import Grains, Sample, SceneSolve, Wires
+from fenchel.dem.triaxial import QUALITY
 
 PRESSURE = 5e4
 GRAINS = Grains(count=300, normal_stiffness=4.3e4)
@@ -151,6 +152,7 @@ def test_triaxial_with_links_and_the_control(rested: Assembly) -> None:
     control = triaxial(rested, linked=False, path=path).record(seed=0, settings={})
     for record in (linked, control):
         quality = record.quality
+        assert set(quality) == set(QUALITY)
         assert quality["violation_over_radius"] < 1e-3
         assert quality["unbalanced_max"] < 1e-2
         assert quality["natural_map_max"] < 1e-4

@@ -26,6 +26,7 @@ def _dem(
     Example: fenchel dem scene.toml -o run.h5
     """
     from fenchel.dem import run_scene
+    from fenchel.dem.triaxial import QUALITY
 
     from .progress import progress_bar
     from .tables import print_json, print_table
@@ -44,4 +45,5 @@ def _dem(
             }
         )
     else:
-        print_table(("quality", "value"), record.quality.items(), title=f"{output}: {len(record.leg)} frames")
+        rows = [(name, value, *QUALITY[name]) for name, value in record.quality.items()]
+        print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
