@@ -18,9 +18,9 @@ SWEEPS = 50
 def problem():
     grains, wires = Grains(count=1000, normal_stiffness=4.3e4), Wires(count=75)
     assembly: Assembly = make_sample(grains, wires, Sample(), 1)
-    for stage in preparation(assembly, grains, wires, Sample(), SceneSolve(), PRESSURE)[:1]:
-        while stage.steps < 200:
-            stage.advance()
+    stage = preparation(grains, wires, Sample(), SceneSolve(), PRESSURE)[0](assembly)
+    while stage.steps < 200:
+        stage.advance()
     simulation = Simulation(assembly, material_of(grains, wires), Solver())
     step = 0.05 * 2.0 * assembly.grain_radius * np.sqrt(grains.density / PRESSURE)
     _, free, _, box, _, rows = simulation.assemble(step, Drive(pressure=np.full(3, PRESSURE)))
@@ -34,7 +34,7 @@ def test_sweeps(benchmark, problem) -> None:
     def sweep() -> None:
         solve(
             free.copy(), box.copy(), rows.pair, rows.contact.copy(), rows.wall, rows.wall_row.copy(), rows.link, rows.link_row.copy(),
-            rows.cn, rows.ct, True, True, 0.0, 1e-30, SWEEPS, 1,
+            rows.cn, rows.ct, True, True, 0.0, 1e-30, SWEEPS,
         )  # fmt: skip
 
     benchmark(sweep)

@@ -230,7 +230,6 @@ def solve(
     tolerance: float,
     floor: float,
     sweep_limit: int,
-    sweep_least: int,
 ) -> tuple[int, float]:
     """Sweep until √(Σ|δp|²/Σp_n²) over one sweep falls below `tolerance`; returns (sweeps, that ratio).
 
@@ -251,6 +250,6 @@ def solve(
         size += s
         done += 1
         ratio = np.sqrt(change / max(size, floor * floor)) if floor > 0.0 or size > 0.0 else np.sqrt(change)
-        if ratio <= tolerance and done >= sweep_least:
+        if ratio <= tolerance:
             break
     return done, ratio

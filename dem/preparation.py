@@ -10,7 +10,9 @@ control without start from one and the same state, at rest without them.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -148,39 +150,24 @@ def make_sample(grains: Grains, wires: Wires | None, sample: Sample, seed: int) 
 
 
 def preparation(
-    assembly: Assembly, grains: Grains, wires: Wires | None, sample: Sample, solve: SceneSolve, pressure: float
-) -> list[IsotropicStage]:
-    """The stages from a densified sample to rest at `pressure` under the friction and the tolerance of the test."""
+    grains: Grains, wires: Wires | None, sample: Sample, solve: SceneSolve, pressure: float
+) -> list[Callable[[Assembly], IsotropicStage]]:
+    """Makers of the stages from a densified sample to rest at `pressure` under the friction and the tolerance of the test."""
     law = material_of(grains, wires)
     prestressed = wires is not None and wires.state == "prestressed"
     loose = Solver(tolerance=sample.tolerance, sweep_limit=solve.sweep_limit)
     tight = Solver(tolerance=solve.tolerance, sweep_limit=solve.sweep_limit)
     smooth = replace(law, friction=sample.friction, bead_friction=sample.friction)
     loose_beads = replace(law, links=law.links and prestressed)
-    keep: dict[str, Any] = {"pressure": pressure, "density": grains.density}
-    slackening = [
-        IsotropicStage(
-            assembly,
-            smooth,
-            loose,
-            name="slackening",
-            least=60.0,
-            step_fraction=2 * solve.step,
-            slacken=True,
-            to_rest=False,
-            **keep,
-        )
-    ]
+    stage = partial(IsotropicStage, pressure=pressure, density=grains.density, step_fraction=solve.step)
+    coarse = partial(stage, material=smooth, solver=loose, least=60.0, step_fraction=2 * solve.step)
+    compression = partial(coarse, name="compression", quench=10.0)
+    slackening = partial(coarse, name="slackening", slacken=True, to_rest=False)
+    friction_on = partial(stage, material=loose_beads, solver=loose, name="friction on", least=20.0)
+    rest = partial(stage, material=loose_beads, solver=tight, name="rest", least=5.0)
     if prestressed or not law.links:
-        slackening = []
-    return [
-        IsotropicStage(
-            assembly, smooth, loose, name="compression", least=60.0, step_fraction=2 * solve.step, quench=10.0, **keep
-        ),
-        *slackening,
-        IsotropicStage(assembly, loose_beads, loose, name="friction on", least=20.0, step_fraction=solve.step, **keep),
-        IsotropicStage(assembly, loose_beads, tight, name="rest", least=5.0, step_fraction=solve.step, **keep),
-    ]
+        return [compression, friction_on, rest]
+    return [compression, slackening, friction_on, rest]
 
 
 def pressure_change(

@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, replace
+from functools import partial
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -238,18 +239,16 @@ def triaxial_stage(
 
 def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
     """Makers of the stages of a scene: a stage is made when its turn comes, from the assembly as it is then."""
-
-    def prepared(k: int) -> Callable[[Assembly], Stage]:
-        return lambda assembly: preparation(
-            assembly, scene.grains, scene.wires, scene.sample, scene.solve, scene.triaxial.pressure
-        )[k]
-
-    def test(assembly: Assembly) -> Stage:
-        return triaxial_stage(assembly, scene.grains, scene.wires, scene.triaxial, scene.solve, scene.triaxial.pressure)
-
-    dummy = Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1), np.ones(3))
-    count = len(preparation(dummy, scene.grains, scene.wires, scene.sample, scene.solve, scene.triaxial.pressure))
-    return [*(prepared(k) for k in range(count)), test]
+    pressure = scene.triaxial.pressure
+    test = partial(
+        triaxial_stage,
+        grains=scene.grains,
+        wires=scene.wires,
+        path=scene.triaxial,
+        solve=scene.solve,
+        pressure=pressure,
+    )
+    return [*preparation(scene.grains, scene.wires, scene.sample, scene.solve, pressure), test]
 
 
 def record_content(record: TriaxialRecord) -> dict[str, Any]:

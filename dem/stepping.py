@@ -45,7 +45,6 @@ class Solver:
 
     tolerance: float = 1e-5
     sweep_limit: int = 2000
-    sweep_least: int = 1
     keep_unconverged: bool = False
 
 
@@ -198,7 +197,7 @@ class Simulation:
         floor = 1e-12 * float(a.mass.mean()) * a.grain_radius / step
         self.sweeps, self.change = solve(
             vel, box, rows.pair, rows.contact, rows.wall, rows.wall_row, rows.link, rows.link_row,
-            rows.cn, rows.ct, frictional, unilateral, solver.tolerance, floor, solver.sweep_limit, solver.sweep_least,
+            rows.cn, rows.ct, frictional, unilateral, solver.tolerance, floor, solver.sweep_limit,
         )  # fmt: skip
         self.total_sweeps += self.sweeps
         self.total_rows += self.sweeps * (len(rows.pair) + len(rows.wall) + len(rows.link))

@@ -21,7 +21,8 @@ WIRES = Wires(count=20, beads=20)
 @pytest.fixture(scope="module", params=[1, 2])
 def rested(request: pytest.FixtureRequest) -> Assembly:
     assembly = make_sample(GRAINS, WIRES, Sample(), request.param)
-    for stage in preparation(assembly, GRAINS, WIRES, Sample(), SceneSolve(), PRESSURE):
+    for make in preparation(GRAINS, WIRES, Sample(), SceneSolve(), PRESSURE):
+        stage = make(assembly)
         while not stage.done:
             stage.advance()
     return assembly
@@ -207,7 +208,8 @@ def test_a_small_sample_with_wedged_beads_is_made_and_comes_to_rest() -> None:
     """Densification leaves a bead wedged by 0.8 of its radius here; the compression removes it."""
     grains, wires = Grains(count=200, normal_stiffness=4.3e4), Wires(count=12, beads=20)
     assembly = make_sample(grains, wires, Sample(), 1)
-    for stage in preparation(assembly, grains, wires, Sample(), SceneSolve(), PRESSURE)[:1]:
+    for make in preparation(grains, wires, Sample(), SceneSolve(), PRESSURE)[:1]:
+        stage = make(assembly)
         while not stage.done:
             measures = stage.advance()
     assert measures["overlap_max"] < 0.05 * assembly.grain_radius
@@ -216,7 +218,8 @@ def test_a_small_sample_with_wedged_beads_is_made_and_comes_to_rest() -> None:
 def test_prestressed_wires_pull_before_the_test() -> None:
     wires = Wires(count=20, beads=20, state="prestressed")
     assembly = make_sample(GRAINS, wires, Sample(), 3)
-    for stage in preparation(assembly, GRAINS, wires, Sample(), SceneSolve(), PRESSURE):
+    for make in preparation(GRAINS, wires, Sample(), SceneSolve(), PRESSURE):
+        stage = make(assembly)
         while not stage.done:
             stage.advance()
     assert np.mean(assembly.link_impulse > 0.0) > 0.1

@@ -17,7 +17,8 @@ def sphere_over_wall(count: int, seed: int) -> tuple[float, float]:
     grains = Grains(count=count, normal_stiffness=4.3e4)
     assembly = make_sample(grains, None, Sample(), seed)
     rows = None
-    for stage in preparation(assembly, grains, None, Sample(), SceneSolve(), 5e4):
+    for make in preparation(grains, None, Sample(), SceneSolve(), 5e4):
+        stage = make(assembly)
         while not stage.done:
             stage.advance()
         rows = stage.simulation.contacts

@@ -6,12 +6,10 @@ regression values; Table 3 of Laniel, Alart and Pagano for the sets.
 
 from __future__ import annotations
 
-import importlib.util
-import sys
 from math import tan
-from pathlib import Path
 
 import numpy as np
+import planted_law
 import pytest
 
 from fenchel.identify import (
@@ -26,11 +24,6 @@ from fenchel.identify import (
     identify_law,
 )
 
-_spec = importlib.util.spec_from_file_location("planted_law", Path(__file__).parents[1] / "planted_law.py")
-assert _spec is not None and _spec.loader is not None
-planted_law = importlib.util.module_from_spec(_spec)
-sys.modules["planted_law"] = planted_law
-_spec.loader.exec_module(planted_law)
 Planted = planted_law.Planted
 
 TABLE_3 = Planted(E_s=12.167e6, E_w=0.332e6, nu=0.2, theta_f=0.079, C_0=2842.0, H_k=0.944e6, H_i=0.472e6)

@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import re
-import sys
 import tomllib
-from pathlib import Path
 
 import numpy as np
+import planted_law
 import pytest
 
 from fenchel.errors import InputError, StorageError
@@ -27,12 +25,6 @@ from fenchel.identify import (
 )
 from fenchel.integrators import drive_arrays
 from fenchel.potentials import load_law
-
-_spec = importlib.util.spec_from_file_location("planted_law", Path(__file__).parents[1] / "planted_law.py")
-assert _spec is not None and _spec.loader is not None
-planted_law = importlib.util.module_from_spec(_spec)
-sys.modules["planted_law"] = planted_law
-_spec.loader.exec_module(planted_law)
 
 LAW = planted_law.Planted(E_s=13e6, E_w=0.25e6, nu=0.12, theta_f=0.30, C_0=2500.0, H_k=2.6e6, H_i=0.15e6)
 PRESSURES = (5e4, 7e4, 9e4)

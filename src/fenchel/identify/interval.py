@@ -44,11 +44,6 @@ class Estimate:
     octant_deviation: float  # jackknife, root mean square over the seeds; nan without octants
     note: str = ""
 
-    @property
-    def half_width(self) -> float:
-        """Half the width before clipping at a physical bound; nan without a source."""
-        return max(self.high - self.value, self.value - self.low)
-
 
 def jackknife_deviation(leave_one_out: Sequence[float] | NDArray[np.float64]) -> float | NDArray[np.float64]:
     """√((g−1)/g Σ(x_(i) − x̄)²) over the first axis, of g leave-one-out values; for a mean it equals s/√g exactly."""

@@ -17,7 +17,7 @@ import msgspec
 import numpy as np
 
 from ..dem.bodies import Assembly
-from ..dem.preparation import IsotropicStage, make_sample, material_of, preparation, pressure_change
+from ..dem.preparation import make_sample, material_of, preparation, pressure_change
 from ..dem.record import TriaxialRecord
 from ..dem.run import Progress, Stage, finished_test, record_of, run_stages, triaxial_stage
 from ..dem.stepping import Drive, Material, Simulation, Solver
@@ -94,9 +94,7 @@ class Prepare:
         for k, pressure in enumerate(levels):
             makers: list[Callable[[Assembly], Stage]]
             if k == 0:
-                stages = (study.grains, study.wires, study.sample, study.solve, pressure)
-                count = len(preparation(_dot(), *stages))
-                makers = [partial(_prepared, stages=stages, index=i) for i in range(count)]
+                makers = [*preparation(study.grains, study.wires, study.sample, study.solve, pressure)]
                 begin = partial(make_sample, study.grains, study.wires, study.sample, self.seed)
             else:
                 before = levels[k - 1]
@@ -121,14 +119,6 @@ class Prepare:
                     progress_file(self.folder, self.name), replace(p, fraction=(k + p.fraction) / len(levels))
                 ),
             )
-
-
-def _dot() -> Assembly:
-    return Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1), np.ones(3))
-
-
-def _prepared(assembly: Assembly, stages: tuple[Any, ...], index: int) -> IsotropicStage:
-    return preparation(assembly, *stages)[index]
 
 
 def _state_content(assembly: Assembly, stage: Stage) -> dict[str, Any]:
