@@ -14,9 +14,9 @@ from sympy import Add, Dummy, Expr, Float, Mul, Poly, PolynomialError, S, expand
 
 from ..errors import DeclarationError, InputError
 from ..potentials import Law, unilateral_energy
+from ..potentials.atoms.positive_part import PositivePart
 from ..potentials.derivative import invariants_of
 from ..potentials.invariants import InnerLeaf, NormLeaf, PositiveSquareLeaf, TraceLeaf
-from ..potentials.scalars import PositivePart
 from ..potentials.tensor import Deviator, IdentityTensor, SymmetricTensor
 from .closed import state_layout
 
@@ -111,12 +111,12 @@ def energy_atoms(law: Law, values: Mapping[str, float]) -> ConvexAtoms:
     n = size + 6
     hessian, linear, constant = np.zeros((n, n)), np.zeros(n), 0.0
     positive, spectral = [], []
-    kinks = sorted(law.psi.atoms(PositivePart), key=str)
-    leaves = invariants_of(law.psi)
+    kinks = sorted(law.energy.atoms(PositivePart), key=str)
+    leaves = invariants_of(law.energy)
     scalars = [v for v in law.internal if v not in layout or layout[v.name][1] == 1]
     generators: list[Any] = [*kinks, *leaves, *scalars]
     dummies = {g: Dummy(f"g{i}") for i, g in enumerate(generators)}
-    body = law.psi.xreplace({k: dummies[k] for k in kinks}).xreplace({g: dummies[g] for g in (*leaves, *scalars)})
+    body = law.energy.xreplace({k: dummies[k] for k in kinks}).xreplace({g: dummies[g] for g in (*leaves, *scalars)})
     try:
         terms = Poly(body, *dummies.values()).terms() if dummies else [((), body)]
     except PolynomialError:

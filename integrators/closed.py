@@ -17,11 +17,12 @@ from typing import Any
 from sympy import Expr, S, Symbol
 
 from ..potentials import Law
+from ..potentials.atoms.positive_part import Step
 from ..potentials.derivative import Operator, invariants_of, is_constant
 from ..potentials.energy_terms import sort_energy
 from ..potentials.invariants import NormLeaf
 from ..potentials.printer import number_code
-from ..potentials.scalars import ForceScalar, ScalarVariable, Step
+from ..potentials.scalars import ForceScalar, ScalarVariable
 from ..potentials.tensor import Deviator, IdentityTensor, SymmetricTensor, from_terms
 from .driving_text import BATCH, DRIVE
 from .structure import ConeStructure, Moduli, find_cone, find_moduli, internal_scalars, internal_tensors
@@ -180,7 +181,7 @@ def _views(law: Law, source: str, tensors: bool = True, scalars: bool = True) ->
 
 def _energy(law: Law, constants: dict[Expr, str]) -> tuple[list[str], tuple[set[str], int]]:
     writer = Writer(constants)
-    code = writer.code(law.psi)
+    code = writer.code(law.energy)
     writer.line(f"return {code}")
     head = [
         "@njit(folder=FOLDER)",

@@ -25,7 +25,7 @@ from sympy import Dummy, Expr, S
 
 from ..errors import DeclarationError
 from ..potentials import Law
-from ..potentials.derivative import Operator, gradient, invariants_of, is_constant, second_derivative
+from ..potentials.derivative import Operator, invariants_of, is_constant, partial, second_derivative
 from ..potentials.invariants import NormLeaf, TraceLeaf
 from ..potentials.scalars import ScalarVariable
 from ..potentials.tensor import Deviator, SymmetricTensor, TensorSymbol
@@ -83,17 +83,17 @@ def internal_scalars(law: Law) -> tuple[ScalarVariable, ...]:
 def find_moduli(law: Law) -> Moduli:
     """Blocks of the second derivative of ψ; refuses couplings that the step does not know."""
     tensors, scalars = internal_tensors(law), internal_scalars(law)
-    mixed = tuple(second_derivative(law.psi, law.observable, x) for x in tensors)
-    blocks = tuple(tuple(second_derivative(law.psi, x, y) for y in tensors) for x in tensors)
+    mixed = tuple(second_derivative(law.energy, law.observable, x) for x in tensors)
+    blocks = tuple(tuple(second_derivative(law.energy, x, y) for y in tensors) for x in tensors)
     for name, operator in [
         *((f"{law.observable}–{x}", o) for x, o in zip(tensors, mixed, strict=True)),
         *((f"{x}–{y}", o) for x, row in zip(tensors, blocks, strict=True) for y, o in zip(tensors, row, strict=True)),
     ]:
-        if not operator.is_isotropic_constant:
+        if not (operator.is_isotropic and is_constant(operator.c0) and is_constant(operator.c1)):
             raise NoConeStructure(
                 f"law '{law.name}': the block {name} of the second derivative of psi is not constant and isotropic"
             )
-    slopes = [gradient(law.psi, s) for s in scalars]
+    slopes = [partial(law.energy, s) for s in scalars]
     rows = tuple(tuple(slope.diff(s) for s in scalars) for slope in slopes)  # type: ignore[union-attr]
     for s, slope, row in zip(scalars, slopes, rows, strict=True):
         assert isinstance(slope, Expr)
@@ -101,7 +101,7 @@ def find_moduli(law: Law) -> Moduli:
             raise NoConeStructure(f"law '{law.name}': psi couples the scalar '{s}' with a tensor")
         if not all(is_constant(entry) for entry in row):
             raise NoConeStructure(f"law '{law.name}': psi is not quadratic in the scalar '{s}'")
-    return Moduli(second_derivative(law.psi, law.observable, law.observable), mixed, blocks, rows)
+    return Moduli(second_derivative(law.energy, law.observable, law.observable), mixed, blocks, rows)
 
 
 def find_cone(law: Law, moduli: Moduli) -> ConeStructure:

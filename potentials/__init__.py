@@ -5,21 +5,29 @@ Tensor algebra on sympy, parameters with units and bounds, forces and indicators
 """
 
 from ..errors import DeclarationError
-from .forces import Indicator, forces, indicator
-from .invariants import inner, norm, pos, tr
+from .extended import Extended, indicator
+from .invariants import eig_max, eig_min, eig_sum, inner, norm, pos, tr
 from .law import Law
 from .resolve import load_law
-from .scalars import parameter, parameters, scalar
+from .roles import entropy_flux, forces, frozen, gradient, rates
+from .scalars import parameter, parameters, scalar, temperature
 from .stiffness import isotropic, lame
 from .tensor import dev, identity, sym_tensor
 from .unilateral import unilateral_conjugate, unilateral_energy
+from .vector import vector
 
 __all__ = [
     "DeclarationError",
-    "Indicator",
+    "Extended",
     "Law",
     "dev",
+    "eig_max",
+    "eig_min",
+    "eig_sum",
+    "entropy_flux",
     "forces",
+    "frozen",
+    "gradient",
     "identity",
     "indicator",
     "inner",
@@ -30,9 +38,12 @@ __all__ = [
     "parameter",
     "parameters",
     "pos",
+    "rates",
     "scalar",
     "sym_tensor",
+    "temperature",
     "tr",
     "unilateral_conjugate",
     "unilateral_energy",
+    "vector",
 ]

@@ -7,10 +7,11 @@ from typing import Any
 
 from sympy import Add, Dummy, Expr, Poly, PolynomialError, S
 
+from .atoms.positive_part import PositivePart
 from .derivative import invariants_of
 from .invariants import InnerLeaf, PositiveSquareLeaf, TraceLeaf
 from .law import Law
-from .scalars import PositivePart, ScalarVariable
+from .scalars import ScalarVariable
 from .tensor import SymmetricTensor
 
 __all__ = ["EnergyTerms", "sort_energy"]
@@ -30,15 +31,15 @@ class EnergyTerms:
 def sort_energy(law: Law) -> EnergyTerms:
     """Sorted terms of ψ; unknown terms end in `rest`."""
     found = EnergyTerms()
-    kinks = sorted(law.psi.atoms(PositivePart), key=str)
-    generators: list[Expr] = [*kinks, *invariants_of(law.psi), *sorted(law.psi.atoms(ScalarVariable), key=str)]
+    kinks = sorted(law.energy.atoms(PositivePart), key=str)
+    generators: list[Expr] = [*kinks, *invariants_of(law.energy), *sorted(law.energy.atoms(ScalarVariable), key=str)]
     dummies = [Dummy(f"g{i}") for i in range(len(generators))]
-    body = law.psi.xreplace(dict(zip(generators[: len(kinks)], dummies, strict=False)))
+    body = law.energy.xreplace(dict(zip(generators[: len(kinks)], dummies, strict=False)))
     body = body.xreplace(dict(zip(generators[len(kinks) :], dummies[len(kinks) :], strict=True)))
     try:
         terms = Poly(body, *dummies).terms() if dummies else [((), body)]
     except PolynomialError:
-        found.rest.append(law.psi)
+        found.rest.append(law.energy)
         return found
     for powers, coefficient in terms:
         factors = [g for g, power in zip(generators, powers, strict=True) for _ in range(power)]

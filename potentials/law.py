@@ -1,10 +1,11 @@
 """A law: a free energy ψ, a force function φ*, and the names of its variables.
 
-Generalised standard material, per unit volume and at constant temperature:
+Generalised standard material, with the temperature T given during a step:
 
-    σ = ∂ψ/∂ε,   A_m = −∂ψ/∂α_m,   α̇_m ∈ ∂_{A_m} φ*(A).
+    σ^r = ρ ∂ψ/∂ε,   A_m = −ρ ∂ψ/∂α_m,   s = −∂ψ/∂T,   (ε̇, α̇_m, −q/T) ∈ ∂φ*(σ^ir, A_m, ∇T),   σ = σ^r + σ^ir.
 
-`Law` holds the declaration and nothing else; state laws, table, admissibility, text, update and conic program are derived on demand.
+The force σ^ir of the observable is zero unless φ* mentions it. `Law` holds the declaration and nothing else; state laws, table,
+admissibility, text, update and conic program are derived on demand.
 """
 
 from __future__ import annotations
@@ -16,51 +17,46 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from sympy import Expr, Symbol, default_sort_key, sstr, sympify
+from sympy import Expr, S, default_sort_key, sstr, sympify
 
 from ..errors import DeclarationError, InputError
-from .derivative import gradient
-from .forces import Indicator
-from .invariants import Invariant
-from .names import checked_name
-from .scalars import ForceScalar, Parameter, ScalarVariable
-from .tensor import ForceTensor, PositiveTensor, SymmetricTensor, TensorSymbol
+from .declaration import check_declaration, normalise
+from .derivative import partial
+from .extended import Extended
+from .scalars import Parameter, ScalarVariable, Temperature
+from .tensor import SymmetricTensor, TensorSymbol
+from .vector import VectorSymbol
 
 __all__ = ["Law"]
 
-Variable = TensorSymbol | ScalarVariable
-Force = ForceTensor | ForceScalar
+Variable = TensorSymbol | ScalarVariable | VectorSymbol
+Force = Any
 
 
 @dataclass(frozen=True)
 class Law:
-    """Declared law. `psi` [J/m³], `phi_star` an `indicator(...)` or None (elastic), one observable strain, internal variables.
+    """Declared law. `psi` [J/kg, or J/m³ without `density`] or its conjugate `psi_star`; `phi_star` (of forces) or `phi` (of rates)
+    [W/m³], an expression, an `indicator(...)` or a sum, or None (elastic); one observable strain; internal variables of any rank.
 
+    `irreversible` names the internal tensors whose sum is ε^ir (reversible split; inferred where ψ holds ε − x). `density` ρ [kg/m³].
     Raises `DeclarationError` where the declaration breaks a rule; see `check` for admissibility.
     """
 
     name: str
-    psi: Expr
-    phi_star: Indicator | None = None
+    psi: Any = None
+    phi_star: Any = None
     observable: TensorSymbol = field(default_factory=lambda: TensorSymbol("eps"))
     internal: tuple[Variable, ...] = ()
     note: str = ""
+    phi: Any = None
+    psi_star: Any = None
+    irreversible: tuple[TensorSymbol, ...] | None = None
+    density: Any = None
 
     def __post_init__(self) -> None:
-        checked_name(self.name, "law")
-        if isinstance(self.psi, SymmetricTensor):
-            raise DeclarationError(f"law '{self.name}': rank mismatch: psi is a tensor, an energy is a scalar")
-        object.__setattr__(self, "psi", sympify(self.psi, strict=True))
-        inner = self.internal
-        object.__setattr__(
-            self, "internal", (inner,) if isinstance(inner, (TensorSymbol, ScalarVariable)) else tuple(inner)
-        )
-        if self.phi_star is not None and not isinstance(self.phi_star, Indicator):
-            raise DeclarationError(
-                f"law '{self.name}': phi_star must be indicator(f, ...) so far, not {type(self.phi_star).__name__}"
-            )
-        self._check_variables()
-        self._check_expressions()
+        for key, value in normalise(self).items():
+            object.__setattr__(self, key, value)
+        check_declaration(self)
 
     # -- what was declared -------------------------------------------------------------------------------------------------
 
@@ -73,30 +69,86 @@ class Law:
         return tuple(sorted(found, key=lambda s: s.name))
 
     @cached_property
-    def forces(self) -> dict[Variable, Force]:
-        """Force symbol of each variable that φ* mentions."""
-        found: dict[Variable, Force] = {}
-        for function in self.surfaces:
-            for force in sorted(function.atoms(ForceTensor, ForceScalar), key=default_sort_key):
-                if found.setdefault(force.variable, force) != force:
+    def energy(self) -> Expr:
+        """ρψ [J/m³] in (ε, X, T); of a law declared by ψ*, its conjugate by rule (`DeclarationError` where no rule is known)."""
+        if self.psi is None:
+            from .conjugation import energy_from_conjugate
+
+            return energy_from_conjugate(self)
+        return self.psi if self.density is None else self.density * self.psi
+
+    @cached_property
+    def stress_symbol(self) -> TensorSymbol | None:
+        """The tensor that ψ* was declared in: the stress; None for a law declared by ψ."""
+        from .declaration import stress_of
+
+        return stress_of(self)
+
+    @cached_property
+    def force_potential(self) -> Extended | None:
+        """φ*, declared or by rule from φ; None if the law is elastic or no rule is known for its φ."""
+        if self.phi is None:
+            return self.phi_star
+        from .conjugation import force_potential_from_rates
+
+        return force_potential_from_rates(self)
+
+    @cached_property
+    def forces(self) -> dict[Any, Force]:
+        """Force symbol (or, of a law declared by φ, rate symbol) of each variable that the force function mentions."""
+        potential = self.phi if self.phi is not None else self.phi_star
+        found: dict[Any, Force] = {}
+        if potential is None:
+            return found
+        for function in potential.functions:
+            for symbol in sorted(function.atoms(TensorSymbol, VectorSymbol, ScalarVariable), key=default_sort_key):
+                if symbol.role in ("force", "rate") and found.setdefault(symbol.variable, symbol) != symbol:
                     raise DeclarationError(
-                        f"law '{self.name}': two names for the force of '{force.variable}'; call forces(...) once"
+                        f"law '{self.name}': two names for the force of '{symbol.variable}'; call forces(...) once"
                     )
         return found
 
+    @cached_property
+    def frozen(self) -> tuple[Any, ...]:
+        """State variables whose value at the start of the step enters φ*: the law is then semi-implicit."""
+        potential = self.phi if self.phi is not None else self.phi_star
+        found = set()
+        for function in () if potential is None else potential.functions:
+            symbols = function.atoms(TensorSymbol, VectorSymbol, ScalarVariable)
+            found |= {s.variable for s in symbols if s.role == "frozen"}
+        return tuple(v for v in (self.observable, *self.internal) if v in found)
+
     @property
     def surfaces(self) -> tuple[Expr, ...]:
-        """Functions f of φ* = I{f ≤ 0, ...}."""
-        return () if self.phi_star is None else self.phi_star.functions
+        """Functions f of φ* = … + I{f ≤ 0, ...}."""
+        return () if self.phi_star is None else self.phi_star.surfaces
+
+    @property
+    def viscous(self) -> Expr:
+        """Finite part of φ*, zero for a rate-independent law."""
+        return S.Zero if self.phi_star is None else self.phi_star.finite
+
+    @cached_property
+    def temperature(self) -> Temperature | None:
+        """The temperature that the law mentions, or None."""
+        found = sorted({t for e in self._expressions() for t in e.atoms(Temperature)}, key=str)
+        return found[0] if found else None
 
     @cached_property
     def text(self) -> str:
         """Canonical text of the declaration, the key under which generated code is kept."""
-        lines = [f"law {self.name}", f"psi = {sstr(self.psi, full_prec=True)}"]
-        lines += [f"f = {sstr(f, full_prec=True)}" for f in self.surfaces]
+        lines = [f"law {self.name}"]
+        lines += [f"psi = {_full(self.psi)}"] if self.psi is not None else [f"psi_star = {_full(self.psi_star)}"]
+        potential, word = (self.phi, "phi") if self.phi is not None else (self.phi_star, "phi_star")
+        if potential is not None:
+            lines += [f"{word} = {_full(potential.finite)}"] if potential.finite != 0 else []
+            lines += [f"f = {_full(f)}" for f in potential.surfaces]
+        lines += [f"density = {_full(self.density)}"] if self.density is not None else []
         lines += [f"observable = {self.observable}"]
-        lines += [f"internal = {'tensor' if isinstance(v, TensorSymbol) else 'scalar'} {v}" for v in self.internal]
-        lines += [f"force {self.forces[v]} of {v}" for v in self.internal if v in self.forces]
+        lines += [f"internal = {v.kind if not isinstance(v, ScalarVariable) else 'scalar'} {v}" for v in self.internal]
+        lines += [f"force {self.forces[v]} of {v}" for v in (self.observable, *self.internal) if v in self.forces]
+        lines += [f"irreversible = {' '.join(v.name for v in self.irreversible)}"] if self.irreversible else []
+        lines += [f"temperature = {self.temperature}"] if self.temperature is not None else []
         lines += [f"parameters = {' '.join(p.name for p in self.parameters)}"]
         return "\n".join(lines)
 
@@ -104,13 +156,18 @@ class Law:
 
     @cached_property
     def stress(self) -> SymmetricTensor:
-        """State law σ = ∂ψ/∂ε."""
-        return gradient(self.psi, self.observable)  # type: ignore[return-value]
+        """State law σ^r = ρ ∂ψ/∂ε."""
+        return partial(self.energy, self.observable)
 
     @cached_property
     def force_laws(self) -> dict[Variable, Any]:
-        """State laws A_m = −∂ψ/∂α_m of every internal variable."""
-        return {v: -gradient(self.psi, v) for v in self.internal}
+        """State laws A_m = −ρ ∂ψ/∂α_m of every internal variable."""
+        return {v: -partial(self.energy, v) for v in self.internal}
+
+    @cached_property
+    def entropy(self) -> Expr:
+        """State law ρs = −ρ ∂ψ/∂T [J/(m³ K)]; zero for an isothermal law."""
+        return S.Zero if self.temperature is None else -partial(self.energy, self.temperature)
 
     # -- values ------------------------------------------------------------------------------------------------------------
 
@@ -152,8 +209,14 @@ class Law:
             if not isinstance(new, Expr):
                 raise DeclarationError(f"parameter '{key}' must be replaced by a scalar expression")
             table[known[key]] = new
-        star = None if self.phi_star is None else Indicator(tuple(f.xreplace(table) for f in self.surfaces))  # type: ignore[arg-type]
-        return replace(self, name=name or self.name, psi=self.psi.xreplace(table), phi_star=star)
+        changed = {}
+        for key in ("psi", "psi_star", "density", "phi", "phi_star"):
+            value = getattr(self, key)
+            if isinstance(value, Extended):
+                changed[key] = value.map(lambda e: e.xreplace(table))
+            elif value is not None:
+                changed[key] = value.xreplace(table)
+        return replace(self, name=name or self.name, **changed)
 
     # -- what is derived elsewhere ---------------------------------------------------------------------------------------------
 
@@ -189,83 +252,24 @@ class Law:
     # -- checks ------------------------------------------------------------------------------------------------------------
 
     def _expressions(self) -> tuple[Expr, ...]:
-        return (self.psi, *self.surfaces)
-
-    def _check_variables(self) -> None:
-        if not isinstance(self.observable, TensorSymbol) or isinstance(self.observable, ForceTensor):
-            raise DeclarationError(f"law '{self.name}': observable must be a tensor variable, sym_tensor('eps')")
-        seen = {self.observable.name}
-        for variable in self.internal:
-            if not isinstance(variable, (TensorSymbol, ScalarVariable)) or isinstance(
-                variable, (ForceTensor, ForceScalar)
-            ):
-                raise DeclarationError(
-                    f"law '{self.name}': internal variable {variable} must be sym_tensor(...) or scalar(...)"
-                )
-            if variable.name in seen:
-                raise DeclarationError(f"law '{self.name}': the variable '{variable.name}' is declared twice")
-            seen.add(variable.name)
-
-    def _check_expressions(self) -> None:
-        declared = {self.observable, *self.internal}
-        rule = f"law '{self.name}'"
-        for what, expression in (("psi", self.psi), *(("phi_star", f) for f in self.surfaces)):
-            for symbol in sorted(expression.free_symbols, key=str):
-                if type(symbol) is Symbol or not isinstance(symbol, (Parameter, ScalarVariable)):
-                    raise DeclarationError(
-                        f"{rule}: '{symbol}' in {what} is a bare symbol; declare it with parameter(...) or scalar(...)"
-                    )
-            for leaf in expression.atoms(Invariant):
-                _check_leaf(rule, what, leaf)
-            symbols = [s for s in expression.atoms(TensorSymbol) if not isinstance(s, ForceTensor)]
-            symbols += [s for s in expression.atoms(ScalarVariable) if not isinstance(s, ForceScalar)]
-            owners = [s.variable for s in expression.atoms(ForceTensor, ForceScalar)]
-            for symbol in sorted({*symbols, *owners}, key=str):
-                if symbol not in declared:
-                    raise DeclarationError(
-                        f"{rule}: '{symbol}' is used in {what} but not declared; add it to internal=(...)"
-                    )
-            if what == "psi" and owners:
-                raise DeclarationError(f"{rule}: psi mentions a force; a free energy depends on state variables only")
-            states = set(symbols) - set(owners)
-            if what == "phi_star" and (states or expression.atoms(ScalarVariable) - expression.atoms(ForceScalar)):
-                shown = ", ".join(sorted(str(s) for s in states))
-                raise DeclarationError(
-                    f"{rule}: phi_star mentions the state {shown}; it may depend on forces only, see forces(...)"
-                )
-        if self.observable in self.forces:
-            raise DeclarationError(
-                f"{rule}: phi_star mentions the force of '{self.observable}' (viscous stress); not modelled yet"
-            )
-        names = [p.name for p in self.parameters]
-        for name in names:
-            if names.count(name) > 1:
-                raise DeclarationError(
-                    f"{rule}: two parameters are called '{name}' with different bounds or units; declare it once"
-                )
-            if name in {v.name for v in declared}:
-                raise DeclarationError(f"{rule}: '{name}' is both a parameter and a variable; rename one")
+        found = [e for e in (self.psi, self.psi_star, self.density) if e is not None]
+        for potential in (self.phi_star, self.phi):
+            found += [] if potential is None else list(potential.functions)
+        return tuple(found)
 
     def check_evolution(self) -> None:
         """Refuse an internal variable that ψ weighs but φ* does not move."""
+        free = self.energy if self.psi is not None else self.psi_star
         for variable in self.internal:
-            if variable not in self.forces and self.psi.has(variable):
+            if variable not in self.forces and free.has(variable):
                 raise DeclarationError(
                     f"law '{self.name}': the internal variable '{variable}' cannot evolve, because phi_star does not mention its force; "
                     f"add forces({variable}) to phi_star or take the variable out"
                 )
 
 
-def _check_leaf(rule: str, what: str, leaf: Invariant) -> None:
-    for tensor in leaf.args:
-        assert isinstance(tensor, SymmetricTensor)
-        for atom, coefficient in tensor.terms().items():
-            if coefficient.has(Invariant) or coefficient.atoms(ScalarVariable):
-                raise DeclarationError(
-                    f"{rule}: the coefficient {coefficient} of a tensor in {what} depends on the state; it may hold parameters only"
-                )
-            if atom.has(PositiveTensor):
-                raise DeclarationError(f"{rule}: {leaf} in {what} is not available; use inner(pos(e), pos(e))")
+def _full(expression: Any) -> str:
+    return sstr(expression, full_prec=True)
 
 
 def _integrators() -> Any:

@@ -9,21 +9,22 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from sympy import Expr, Function, S, Symbol
+from sympy import Symbol
 
 from ..errors import DeclarationError
 from .names import checked_name, latex_name
 
 __all__ = [
     "ForceScalar",
+    "FrozenScalar",
     "Parameter",
-    "PositivePart",
+    "RateScalar",
     "ScalarVariable",
-    "Step",
+    "Temperature",
     "parameter",
     "parameters",
     "scalar",
-    "tidy",
+    "temperature",
 ]
 
 
@@ -64,6 +65,7 @@ class ScalarVariable(Symbol):
     """Scalar state variable."""
 
     __slots__ = ()
+    role = "state"
 
     def __new__(cls, name: str) -> ScalarVariable:
         return Symbol.__xnew__(cls, name, real=True)
@@ -75,13 +77,22 @@ class ScalarVariable(Symbol):
         return latex_name(self.name) + ("" if exp is None else f"^{{{exp}}}")
 
 
-class ForceScalar(ScalarVariable):
-    """Thermodynamic force R = −∂ψ/∂p of a scalar variable."""
+class Temperature(ScalarVariable):
+    """Absolute temperature T > 0 [K]: a state variable in which ψ is concave; it is given from outside during a step."""
+
+    __slots__ = ()
+
+    def __new__(cls, name: str) -> Temperature:
+        return Symbol.__xnew__(cls, name, positive=True)
+
+
+class _PairedScalar(ScalarVariable):
+    """Scalar symbol that belongs to a scalar variable."""
 
     __slots__ = ("variable",)
     variable: ScalarVariable
 
-    def __new__(cls, name: str, variable: ScalarVariable) -> ForceScalar:
+    def __new__(cls, name: str, variable: ScalarVariable) -> Any:
         obj = Symbol.__xnew__(cls, name, real=True)
         obj.variable = variable
         return obj
@@ -93,68 +104,38 @@ class ForceScalar(ScalarVariable):
         return (*super()._hashable_content(), self.variable.name)
 
 
-class PositivePart(Function):
-    """⟨x⟩ = max(x, 0): convex, non-decreasing, positively homogeneous of degree 1."""
+class ForceScalar(_PairedScalar):
+    """Thermodynamic force R = −∂ψ/∂p of a scalar variable."""
 
-    is_real = True
-    is_nonnegative = True
+    __slots__ = ()
+    role = "force"
 
-    @classmethod
-    def eval(cls, x: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
-        if x.is_nonnegative:
-            return x
-        return S.Zero if x.is_nonpositive else None
 
-    def fdiff(self, argindex: int = 1) -> Any:
-        return Step(self.args[0])
+class RateScalar(_PairedScalar):
+    """Rate of a scalar variable."""
+
+    __slots__ = ()
+    role = "rate"
 
     def _sympystr(self, printer: Any) -> str:
-        return f"pos({printer._print(self.args[0])})"
+        return f"d{self.variable.name}/dt"
 
     def _latex(self, printer: Any, exp: str | None = None) -> str:
-        body = rf"\left\langle {printer._print(self.args[0])}\right\rangle"
-        return body if exp is None else rf"{body}^{{{exp}}}"
+        return rf"\dot{{{latex_name(self.variable.name)}}}" + ("" if exp is None else f"^{{{exp}}}")
 
 
-class Step(Function):
-    """H(x) = 1 for x > 0, else 0; its derivative is taken as 0 (the kink has measure zero)."""
+class FrozenScalar(_PairedScalar):
+    """Value of a scalar variable at the start of the step."""
 
-    is_real = True
-    is_nonnegative = True
-
-    @classmethod
-    def eval(cls, x: Any) -> Any:  # pyright: ignore[reportIncompatibleMethodOverride]
-        if x.is_positive:
-            return S.One
-        return S.Zero if x.is_nonpositive else None
-
-    def fdiff(self, argindex: int = 1) -> Expr:
-        return S.Zero
-
-    def _eval_power(self, expt: Expr) -> Expr | None:
-        return self if expt.is_positive else None
+    __slots__ = ()
+    role = "frozen"
 
     def _sympystr(self, printer: Any) -> str:
-        return f"step({printer._print(self.args[0])})"
+        return f"frozen({self.variable.name})"
 
     def _latex(self, printer: Any, exp: str | None = None) -> str:
-        body = rf"H\left({printer._print(self.args[0])}\right)"
-        return body if exp is None else rf"{body}^{{{exp}}}"
-
-
-def tidy(expression: Any) -> Any:
-    """Write ⟨x⟩ H(x) as ⟨x⟩."""
-    if not expression.has(Step):
-        return expression
-    if expression.is_Add:
-        return expression.func(*(tidy(a) for a in expression.args))
-    if expression.is_Mul:
-        parts = [tidy(a) for a in expression.args]
-        positive = {
-            base.args[0] for part in parts for base in (part, part.as_base_exp()[0]) if isinstance(base, PositivePart)
-        }
-        return expression.func(*(a for a in parts if not (isinstance(a, Step) and a.args[0] in positive)))
-    return expression
+        body = rf"{latex_name(self.variable.name)}^{{n}}"
+        return body if exp is None else rf"\left({body}\right)^{{{exp}}}"
 
 
 def parameter(
@@ -188,3 +169,8 @@ def parameters(names: str) -> Any:
 def scalar(name: str) -> ScalarVariable:
     """Declare a scalar state variable."""
     return ScalarVariable(checked_name(name, "scalar"))
+
+
+def temperature(name: str = "T") -> Temperature:
+    """Declare the absolute temperature [K]; ψ must be concave in it."""
+    return Temperature(checked_name(name, "temperature"))

@@ -15,7 +15,7 @@ from sympy import latex, sstr
 
 from ..errors import DeclarationError, InputError
 from .conjugate import Phase, StressPotential, partial_conjugate
-from .derivative import gradient, invariants_of
+from .derivative import invariants_of, partial
 from .invariants import inner
 from .law import Law, Variable
 from .names import latex_name
@@ -77,7 +77,7 @@ def build_table(law: Law, formulation: str, split: str) -> Table:
 def _irreversible(law: Law) -> TensorSymbol | None:
     eps = law.observable
     found = set()
-    for leaf in invariants_of(law.psi):
+    for leaf in invariants_of(law.energy):
         for tensor in leaf.args:
             assert isinstance(tensor, SymmetricTensor)
             terms = tensor.terms()
@@ -138,11 +138,11 @@ def _opening(law: Law, irreversible: TensorSymbol | None, block: str) -> list[Ro
 
 def _reversible_energy(law: Law, irreversible: TensorSymbol) -> tuple[Any, TensorSymbol]:
     reversible = sym_tensor(f"{law.observable.name}_r")
-    return law.psi.xreplace({law.observable: reversible + irreversible}), reversible
+    return law.energy.xreplace({law.observable: reversible + irreversible}), reversible
 
 
 def _strain_rows(law: Law, irreversible: TensorSymbol | None, block: str) -> list[Row]:
-    psi, observable = law.psi, law.observable
+    psi, observable = law.energy, law.observable
     stress = ("sig_r", r"\sigma^{r}") if block == "total" else ("sig", r"\sigma")
     if irreversible is not None:
         psi, observable = _reversible_energy(law, irreversible)
@@ -151,7 +151,7 @@ def _strain_rows(law: Law, irreversible: TensorSymbol | None, block: str) -> lis
         _equation(
             "state law",
             stress,
-            gradient(psi, observable),
+            partial(psi, observable),
             f"dpsi/d{observable}",
             rf"\partial_{{{latex(observable)}}}\psi",
         )
@@ -162,7 +162,7 @@ def _strain_rows(law: Law, irreversible: TensorSymbol | None, block: str) -> lis
             _equation(
                 "state law",
                 _force_name(law, v, irreversible),
-                -gradient(psi, v),
+                -partial(psi, v),
                 f"-dpsi/d{symbol[0]}",
                 rf"-\partial_{{{symbol[1]}}}\psi",
             )
@@ -212,16 +212,16 @@ def _stress_rows(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         if phase.energy is not None:
             base = phase.energy if irreversible is None or phase.shift is None else partial_without_shift(phase)
             tex = r"\partial_{" + latex(phase.stress) + r"}\psi^{*}"
-            rows.append(_equation("state law", strain, gradient(base, phase.stress), f"dpsi_star/d{phase.stress}", tex))
+            rows.append(_equation("state law", strain, partial(base, phase.stress), f"dpsi_star/d{phase.stress}", tex))
         else:
             name = _phase_name(phase)
             rows.append(Row("state law", f"{strain[0]} in d{name[0]}", rf"{strain[1]} \in \partial {name[1]}"))
     for v in law.internal:
         name, symbol = _force_name(law, v, irreversible), _name(v)
-        value: Any = -gradient(found.internal, v)
+        value: Any = -partial(found.internal, v)
         for phase in found.phases:
             if phase.energy is not None and irreversible is None and isinstance(v, TensorSymbol):
-                value = value + gradient(phase.energy, v)
+                value = value + partial(phase.energy, v)
             elif irreversible == v and phase.shift is None:
                 value = value - phase.stress
         rows.append(
@@ -275,7 +275,7 @@ def _complementary(law: Law, irreversible: TensorSymbol | None) -> list[Row]:
         for j, f in enumerate(shown_surfaces):
             if v not in law.forces:
                 continue
-            slope = gradient(f, law.forces[v])
+            slope = partial(f, law.forces[v])
             mark = "" if len(shown_surfaces) == 1 else str(j + 1)
             if slope != 0:
                 parts.append(f"gamma{mark}*({sstr(slope)})")

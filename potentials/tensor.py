@@ -1,7 +1,6 @@
 """Symmetric second-order tensors with their own ranked type, beside the scalars of sympy.
 
-A tensor is a sympy `Basic` but not an `Expr`: it can be added to tensors and multiplied by scalars, and nothing else, so that
-it never commutes into a product of scalars by accident. Every tensor is kept as a canonical linear combination
+Every tensor is kept as a canonical linear combination
 
     T = Σ c_k a_k,   a_k ∈ {X, dev X, I, X^≥, dev X^≥}
 
@@ -10,20 +9,23 @@ with scalar coefficients c_k; `dev` is linear and distributes over the sum, dev 
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
-from sympy import Basic, Expr, Integer, S, Tuple, default_sort_key, sympify
+from sympy import Basic, Expr, S, Tuple, default_sort_key
 from sympy.core.symbol import Str
 
 from ..errors import DeclarationError
 from .names import checked_name, latex_name
+from .ranked import Ranked, shown_term, sorted_terms
 
 __all__ = [
     "Deviator",
     "ForceTensor",
+    "FrozenTensor",
     "IdentityTensor",
     "PositiveTensor",
+    "RateTensor",
     "SymmetricTensor",
     "TensorSum",
     "TensorSymbol",
@@ -34,91 +36,23 @@ __all__ = [
 ]
 
 
-def scalar_operand(value: object, action: str) -> Expr:
-    """Turn a number or sympy scalar into an `Expr`; strings are refused (they would be evaluated)."""
-    if isinstance(value, SymmetricTensor):
-        raise DeclarationError(
-            f"rank mismatch: {action} two tensors is not defined; use inner(a, b) for the scalar product"
-        )
-    try:
-        number = sympify(value, strict=True)
-    except Exception:
-        raise DeclarationError(f"rank mismatch: {action} a tensor and {type(value).__name__} is not defined") from None
-    if not isinstance(number, Expr):
-        raise DeclarationError(f"rank mismatch: {action} a tensor and {type(value).__name__} is not defined")
-    if number is S.NaN or number.has(S.NaN, S.ComplexInfinity, S.Infinity, S.NegativeInfinity):
-        raise DeclarationError("a coefficient of a tensor must be finite")
-    return number
-
-
-class SymmetricTensor(Basic):
+class SymmetricTensor(Ranked):
     """Element of 𝕊, the symmetric 3×3 tensors with A:B = tr(AB)."""
 
     __slots__ = ()
-    __array_ufunc__ = None
     rank = 2
+    kind = "tensor"
 
-    def terms(self) -> dict[SymmetricTensor, Expr]:
-        """Atoms and their coefficients."""
-        return {self: S.One}
-
-    def __add__(self, other: object) -> SymmetricTensor:
-        return combine(self, _tensor_operand(other, "adding"))
-
-    __radd__ = __add__
-
-    def __sub__(self, other: object) -> SymmetricTensor:
-        return combine(self, -_tensor_operand(other, "subtracting"))
-
-    def __rsub__(self, other: object) -> SymmetricTensor:
-        return combine(_tensor_operand(other, "subtracting"), -self)
-
-    def __neg__(self) -> SymmetricTensor:
-        return self * Integer(-1)
-
-    def __mul__(self, other: object) -> SymmetricTensor:
-        factor = scalar_operand(other, "multiplying")
-        return TensorSum(*(Tuple(atom, factor * c) for atom, c in self.terms().items()))
-
-    __rmul__ = __mul__
-
-    def __truediv__(self, other: object) -> SymmetricTensor:
-        divisor = scalar_operand(other, "dividing")
-        if divisor.is_zero:
-            raise DeclarationError("a tensor cannot be divided by zero")
-        return self * (S.One / divisor)
-
-    def __pow__(self, other: object) -> Any:
-        raise DeclarationError("rank mismatch: a tensor has no power; write inner(a, a) or norm(a)**n")
-
-    def _sympystr(self, printer: Any) -> str:
-        return _printed(self, printer, latex=False)
-
-    def _latex(self, printer: Any) -> str:
-        return _printed(self, printer, latex=True)
-
-    _sympyrepr = _sympystr
-
-    def _repr_latex_(self) -> str:
-        from sympy import latex
-
-        return f"$\\displaystyle {latex(self)}$"
-
-
-def _tensor_operand(value: object, action: str) -> SymmetricTensor:
-    if isinstance(value, SymmetricTensor):
-        return value
-    if isinstance(value, (int, Integer)) and value == 0:
-        return TensorSum()
-    raise DeclarationError(
-        f"rank mismatch: {action} a tensor and a scalar; write scalar * identity for a spherical tensor"
-    )
+    @classmethod
+    def linear(cls, pairs: Iterable[tuple[Any, Any]]) -> SymmetricTensor:
+        return TensorSum(*(Tuple(t, c) for t, c in pairs))
 
 
 class TensorSymbol(SymmetricTensor):
     """A named tensor variable."""
 
     __slots__ = ()
+    role = "state"
 
     def __new__(cls, name: Any) -> TensorSymbol:
         return super().__new__(cls, name if isinstance(name, Str) else Str(checked_name(name, "tensor")))
@@ -127,24 +61,63 @@ class TensorSymbol(SymmetricTensor):
     def name(self) -> str:
         return str(self.args[0])
 
+    def _shown(self, printer: Any, latex: bool) -> str:
+        return rf"\boldsymbol{{{latex_name(self.name)}}}" if latex else self.name
 
-class ForceTensor(TensorSymbol):
-    """Thermodynamic force A_m = −∂ψ/∂α_m of a tensor variable."""
+
+class _PairedTensor(TensorSymbol):
+    """Tensor symbol that belongs to a tensor variable."""
 
     __slots__ = ()
 
-    def __new__(cls, name: Any, variable: TensorSymbol) -> ForceTensor:
-        return Basic.__new__(cls, name if isinstance(name, Str) else Str(checked_name(name, "force")), variable)
+    def __new__(cls, name: Any, variable: TensorSymbol) -> Any:
+        return Basic.__new__(cls, name if isinstance(name, Str) else Str(checked_name(name, cls.role)), variable)
 
     @property
     def variable(self) -> TensorSymbol:
         return self.args[1]  # type: ignore[return-value]
 
 
+class ForceTensor(_PairedTensor):
+    """Thermodynamic force A_m = −∂ψ/∂α_m of a tensor variable; of the observable, the irreversible stress."""
+
+    __slots__ = ()
+    role = "force"
+
+
+class RateTensor(_PairedTensor):
+    """Rate of a tensor variable."""
+
+    __slots__ = ()
+    role = "rate"
+
+    def _shown(self, printer: Any, latex: bool) -> str:
+        name = self.variable.name
+        return rf"\dot{{\boldsymbol{{{latex_name(name)}}}}}" if latex else f"d{name}/dt"
+
+
+class FrozenTensor(_PairedTensor):
+    """Value of a tensor variable at the start of the step."""
+
+    __slots__ = ()
+    role = "frozen"
+
+    @property
+    def name(self) -> str:
+        return f"{self.variable.name}_frozen_"
+
+    def _shown(self, printer: Any, latex: bool) -> str:
+        name = self.variable.name
+        return rf"\boldsymbol{{{latex_name(name)}}}^{{n}}" if latex else f"frozen({name})"
+
+
 class IdentityTensor(SymmetricTensor):
     """I, with tr I = 3."""
 
     __slots__ = ()
+
+    def _shown(self, printer: Any, latex: bool) -> str:
+        return r"\boldsymbol{I}" if latex else "I"
 
 
 class Deviator(SymmetricTensor):
@@ -161,6 +134,10 @@ class Deviator(SymmetricTensor):
             return TensorSum(*(Tuple(Deviator(atom), c) for atom, c in tensor.terms().items()))
         return Basic.__new__(cls, tensor)
 
+    def _shown(self, printer: Any, latex: bool) -> str:
+        inside = printer._print(self.args[0])
+        return rf"\mathrm{{dev}}\left({inside}\right)" if latex else f"dev({inside})"
+
 
 class PositiveTensor(SymmetricTensor):
     """Spectral positive part X^≥ = Σ ⟨x_i⟩ n_i⊗n_i, the projection of X on the positive semidefinite tensors."""
@@ -176,6 +153,10 @@ class PositiveTensor(SymmetricTensor):
             )
         return Basic.__new__(cls, tensor)
 
+    def _shown(self, printer: Any, latex: bool) -> str:
+        inside = printer._print(self.args[0])
+        return rf"\left({inside}\right)^{{\geq}}" if latex else f"pos({inside})"
+
 
 class TensorSum(SymmetricTensor):
     """Canonical linear combination; arguments are pairs (tensor, coefficient) in any order, flattened and sorted here."""
@@ -183,19 +164,33 @@ class TensorSum(SymmetricTensor):
     __slots__ = ()
 
     def __new__(cls, *pairs: Any) -> SymmetricTensor:  # type: ignore[misc]
-        found: dict[SymmetricTensor, Expr] = {}
-        for tensor, coefficient in pairs:
-            for atom, inner_coefficient in tensor.terms().items():
-                found[atom] = found.get(atom, S.Zero) + coefficient * inner_coefficient
-        kept = {atom: c for atom, c in found.items() if c != 0}
-        if len(kept) == 1:
-            ((atom, c),) = kept.items()
-            if c == 1:
-                return atom
-        return Basic.__new__(cls, *(Tuple(a, kept[a]) for a in sorted(kept, key=default_sort_key)))
+        kept = sorted_terms((p.args[0], p.args[1]) for p in pairs)
+        if len(kept) == 1 and kept[0].args[1] == 1:
+            return kept[0].args[0]  # type: ignore[return-value]
+        return Basic.__new__(cls, *kept)
 
     def terms(self) -> dict[SymmetricTensor, Expr]:
         return {pair.args[0]: pair.args[1] for pair in self.args}  # type: ignore[misc]
+
+    def _shown(self, printer: Any, latex: bool) -> str:
+        terms = self.terms()
+        if not terms:
+            return r"\boldsymbol{0}" if latex else "0"
+        everywhere = all(isinstance(a, Deviator) for a in terms)
+        if everywhere and (len(set(terms.values())) > 1 or set(terms.values()) == {S.One}):
+            inside = printer._print(from_terms({a.args[0]: c for a, c in terms.items()}))  # type: ignore[misc]
+            return rf"\mathrm{{dev}}\left({inside}\right)" if latex else f"dev({inside})"
+        devs = {a: c for a, c in terms.items() if isinstance(a, Deviator)}
+        text = ""
+        if len(devs) > 1 and len(set(devs.values())) == 1:
+            # one factor for the deviator of the sum, as it was declared
+            joined = Deviator(from_terms({a.args[0]: S.One for a in devs}))  # type: ignore[misc]
+            terms = {a: c for a, c in terms.items() if a not in devs}
+            text = shown_term("", next(iter(devs.values())), printer._print(joined), printer, latex)
+        order = sorted(terms.items(), key=lambda pair: (isinstance(pair[0], IdentityTensor), default_sort_key(pair[0])))
+        for atom, c in order:
+            text = shown_term(text, c, printer._print(atom), printer, latex)
+        return text
 
 
 def combine(*tensors: SymmetricTensor) -> SymmetricTensor:
@@ -221,47 +216,3 @@ def dev(tensor: SymmetricTensor) -> SymmetricTensor:
 
 
 identity = IdentityTensor()
-
-
-def _printed(tensor: SymmetricTensor, printer: Any, latex: bool) -> str:
-    if isinstance(tensor, TensorSymbol):
-        return rf"\boldsymbol{{{latex_name(tensor.name)}}}" if latex else tensor.name
-    if isinstance(tensor, IdentityTensor):
-        return r"\boldsymbol{I}" if latex else "I"
-    if isinstance(tensor, Deviator):
-        inside = printer._print(tensor.args[0])
-        return rf"\mathrm{{dev}}\left({inside}\right)" if latex else f"dev({inside})"
-    if isinstance(tensor, PositiveTensor):
-        inside = printer._print(tensor.args[0])
-        return rf"\left({inside}\right)^{{\geq}}" if latex else f"pos({inside})"
-    terms = tensor.terms()
-    if not terms:
-        return r"\boldsymbol{0}" if latex else "0"
-    if all(isinstance(a, Deviator) for a in terms) and (len(set(terms.values())) > 1 or set(terms.values()) == {S.One}):
-        inside = printer._print(from_terms({a.args[0]: c for a, c in terms.items()}))  # type: ignore[misc]
-        return rf"\mathrm{{dev}}\left({inside}\right)" if latex else f"dev({inside})"
-    devs = {a: c for a, c in terms.items() if isinstance(a, Deviator)}
-    if len(devs) > 1 and len(set(devs.values())) == 1:
-        # one factor for the deviator of the sum, as it was declared
-        joined = Deviator(from_terms({a.args[0]: S.One for a in devs}))  # type: ignore[misc]
-        inside = printer._print(joined)
-        terms = {a: c for a, c in terms.items() if a not in devs}
-        text = _term("", next(iter(devs.values())), inside, printer, latex)
-    else:
-        text = ""
-    for atom, c in sorted(
-        terms.items(), key=lambda pair: (isinstance(pair[0], IdentityTensor), default_sort_key(pair[0]))
-    ):
-        text = _term(text, c, printer._print(atom), printer, latex)
-    return text
-
-
-def _term(text: str, c: Expr, body: str, printer: Any, latex: bool) -> str:
-    """`text` with the term c·body appended."""
-    negative = c.could_extract_minus_sign()
-    size = -c if negative else c
-    factor = printer._print(size)
-    if size.is_Add:
-        factor = rf"\left({factor}\right)" if latex else f"({factor})"
-    shown = body if size == 1 else f"{factor}{' ' if latex else '*'}{body}"
-    return text + (" - " if text else "-") + shown if negative else text + (" + " if text else "") + shown

@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from sympy import sqrt, tan
 
-from ..forces import forces, indicator
+from ..extended import indicator
 from ..invariants import norm, tr
 from ..law import Law
+from ..roles import forces
 from ..stiffness import isotropic
 from ..tensor import dev
 from ._symbols import C_0, E, H_i, eps, eps_p, nu, p, theta_f

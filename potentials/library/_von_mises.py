@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from sympy import Rational, sqrt
 
-from ..forces import forces, indicator
+from ..extended import indicator
 from ..invariants import inner, norm
 from ..law import Law
+from ..roles import forces
 from ..stiffness import isotropic
 from ..tensor import dev
 from ._symbols import E, H_i, H_k, alpha, eps, eps_p, nu, p, sigma_y

@@ -59,7 +59,7 @@ def test_the_declaration_of_the_design_works_and_equals_the_library():
             lambda: Law("a", psi=ENERGY, phi_star=indicator(norm(dev(eps_p)) - C), observable=eps, internal=(eps_p,)),
             "state",
         ),
-        (lambda: Law("a", psi=ENERGY, phi_star=norm(dev(A)) - C, observable=eps, internal=(eps_p,)), "indicator"),
+        (lambda: Law("a", psi=ENERGY, phi_star=dev(A), observable=eps, internal=(eps_p,)), "rank mismatch"),
         (lambda: Law("a", psi=ENERGY, observable=eps, internal=(eps_p, eps_p)), "declared twice"),
         (lambda: Law("a", psi=ENERGY, observable=p, internal=(eps_p,)), "observable must be a tensor"),
         (lambda: Law("a b", psi=ENERGY, observable=eps, internal=(eps_p,)), "name begins with a letter"),

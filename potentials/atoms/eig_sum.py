@@ -1,0 +1,89 @@
+"""Σ g(t_i) over the eigenvalues of a tensor: convex if g is (Davis 1957), with gradient g′(T)."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sympy import Expr, S
+
+from ...errors import DeclarationError
+from ..operator import Operator
+from ..spectral import as_function, eigenvalues, spectral_tensor
+from ..tensor import SymmetricTensor
+from .atom import Atom, Invariant
+from .eig_max import checked_tensor
+from .linear import adjoint, linear_part
+
+__all__ = ["EigSum", "EigSumLeaf", "eig_sum"]
+
+
+class EigSumLeaf(Invariant):
+    """Σ g(t_i); arguments are g as a `Lambda` and T."""
+
+    __slots__ = ()
+
+    def _sympystr(self, printer: Any) -> str:
+        function, tensor = self.args
+        symbol = function.variables[0]  # type: ignore[attr-defined]
+        return f"eig_sum({symbol} -> {printer._print(function.expr)}, {printer._print(tensor)})"  # type: ignore[attr-defined]
+
+    _sympyrepr = _sympystr
+
+    def _latex(self, printer: Any, exp: str | None = None) -> str:
+        function, tensor = self.args
+        symbol = printer._print(function.variables[0])  # type: ignore[attr-defined]
+        body = printer._print(function.expr)  # type: ignore[attr-defined]
+        shown = (
+            rf"\sum_i \left[{symbol} \mapsto {body}\right]\!\left(\lambda_i\left({printer._print(tensor)}\right)\right)"
+        )
+        return shown if exp is None else rf"\left({shown}\right)^{{{exp}}}"
+
+
+class EigSum(Atom):
+    """As convex and as smooth as g; gradient and Hessian by g′ and the divided differences of g′."""
+
+    word = "eig_sum"
+    node = EigSumLeaf
+    smoothness = "C1"
+
+    def curvature(self, node: Any, require: Any) -> str:
+        from ..admissibility.convexity import one_variable
+
+        function = node.args[0]
+        return one_variable(function.expr, function.variables[0], require)
+
+    def gradient(self, node: Any, variable: Any) -> Any:
+        function, tensor = node.args
+        if variable.rank != 2:
+            return variable.linear(())
+        symbol = function.variables[0]
+        slope = spectral_tensor(lambda x: function.expr.diff(symbol).xreplace({symbol: x}), tensor)
+        return adjoint(linear_part(tensor, variable), slope)
+
+    def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
+        function, tensor = node.args
+        px, py = linear_part(tensor, x), linear_part(tensor, y)
+        if px == (S.Zero, S.Zero) or py == (S.Zero, S.Zero):
+            return Operator()
+        if px[1] != 0 or py[1] != 0:
+            raise DeclarationError(
+                f"the second derivative of {node} by a deviator is not available; take eig_sum of the tensor itself"
+            )
+        symbol = function.variables[0]
+        slope = spectral_tensor(lambda t: function.expr.diff(symbol).xreplace({symbol: t}), tensor)
+        return Operator(functions=((weight * px[0] * py[0], slope),)) if slope.terms() else Operator()
+
+    def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
+        from ..evaluate import evaluate
+
+        function, values = node.args[0], eigenvalues(arguments[1])
+        return evaluate(function.expr, {function.variables[0]: values}).sum(axis=-1)
+
+
+def eig_sum(function: Any, tensor: SymmetricTensor) -> Expr:
+    """Σ g(t_i) over the eigenvalues of `tensor`; `function` maps a scalar to a scalar, for example `lambda x: pos(x)**3`."""
+    value = checked_tensor(tensor, "eig_sum")
+    found = as_function(function, "eig_sum")
+    if not value.terms():
+        return 3 * found.expr.xreplace({found.variables[0]: S.Zero})
+    return EigSumLeaf(found, value)

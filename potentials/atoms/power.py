@@ -1,0 +1,91 @@
+"""xⁿ, with an exponent that is a number or a parameter."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from sympy import Expr, Pow
+
+from ...errors import DeclarationError
+from .atom import Atom, Require
+
+__all__ = ["Power"]
+
+
+class Power(Atom):
+    """On x ≥ 0: convex and non-decreasing for n ≥ 1, concave and non-decreasing for 0 ≤ n ≤ 1, convex and non-increasing for n ≤ 0
+    (x > 0); for even n convex on all x. The conjugate of xⁿ/n on x ≥ 0 is y^m/m, 1/n + 1/m = 1."""
+
+    word = "**"
+    node = Pow
+
+    def curvature(self, node: Any, require: Require) -> str:
+        exponent = node.exp
+        if exponent == 1:
+            return "affine"
+        if exponent.is_number:
+            return "convex" if exponent > 1 or exponent < 0 else "concave"
+        # a parameter: the only reading that makes a potential is n >= 1
+        require(exponent - 1)
+        return "convex"
+
+    def monotone(self, node: Any, signs: tuple[int, ...]) -> tuple[int, ...]:
+        exponent = node.exp
+        if signs[0] == 1:
+            return (-1 if exponent.is_number and exponent < 0 else 1,)
+        if signs[0] == -1 and exponent.is_even:
+            return (-1 if exponent > 0 else 1,)
+        return (0,)
+
+    def sign(self, node: Any, signs: tuple[int, ...]) -> int:
+        return 1 if signs[0] == 1 or node.exp.is_even else 0
+
+    def degree(self, node: Any) -> Expr:
+        return node.exp
+
+    def domain(self, node: Any) -> tuple[Expr, ...]:
+        exponent = node.exp
+        return () if exponent.is_integer and exponent.is_nonnegative else (node.base,)
+
+    def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
+        import numpy as np
+
+        base, exponent = arguments
+        with np.errstate(all="ignore"):
+            found = np.power(np.asarray(base, dtype=float), exponent)
+        # 1/0 stands beside a quantity that vanishes with it (the gradient of a norm at zero): zero is an element of the subdifferential
+        return np.where((np.asarray(base) == 0.0) & (np.asarray(exponent) < 0.0), 0.0, found)
+
+    def conic(self, node: Any, arguments: tuple[Any, ...], constraints: list[Any]) -> Any:
+        import cvxpy
+
+        base, exponent = arguments[0], float(node.exp)
+        if exponent == 1.0:
+            return base
+        if exponent == 2.0:
+            return cvxpy.square(base)
+        if exponent > 1.0:
+            # |x|^n <= t, by a power cone: t^(1/n) 1^(1-1/n) >= |x|
+            inside, top = cvxpy.Variable(), cvxpy.Variable()
+            constraints.append(inside == base if base.is_affine() else inside >= base)
+            constraints.append(cvxpy.PowCone3D(top, cvxpy.Constant(1.0), inside, 1.0 / exponent))
+            return top
+        if exponent == 0.5:
+            return cvxpy.sqrt(base)
+        if 0.0 < exponent < 1.0:
+            low = cvxpy.Variable()
+            constraints.append(cvxpy.PowCone3D(base, cvxpy.Constant(1.0), low, exponent))
+            return low
+        if exponent == -1.0:
+            return cvxpy.inv_pos(base)
+        raise DeclarationError(f"{node} has no conic form")
+
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
+        n = node.exp
+        if n.is_number and not n > 1:
+            return None
+        # (x^n)* = (n-1) (y/n)^(n/(n-1)) on y >= 0, zero below (x restricted to x >= 0)
+        from .positive_part import PositivePart
+
+        inside = dual if n.is_even else PositivePart(dual)
+        return (n - 1) * (inside / n) ** (n / (n - 1)), ()
