@@ -22,7 +22,7 @@ from .atoms.positive_part import tidy
 from .operator import Operator
 from .ranked import Ranked
 from .scalars import ScalarVariable
-from .tensor import IdentityTensor, identity
+from .tensor import IdentityTensor, TensorSymbol, identity
 from .vector import VectorSymbol
 
 __all__ = ["Operator", "invariants_of", "is_constant", "partial", "second_derivative", "variables_of"]
@@ -40,8 +40,6 @@ def is_constant(expression: Expr) -> bool:
 
 def variables_of(expression: Any) -> set[Any]:
     """State, force and rate symbols in an expression, of any rank; frozen values are data."""
-    from .tensor import TensorSymbol
-
     found = expression.atoms(ScalarVariable, TensorSymbol, VectorSymbol)
     paired = {s.variable for s in found if s.role in ("force", "rate", "frozen")}
     # a paired symbol holds its variable as an argument: that alone is no mention of the state
@@ -70,7 +68,11 @@ def partial(expression: Expr, variable: Any) -> Any:
     body, leaves, dummies = _opened(sympify(expression, strict=True))
     back = dict(zip(dummies, leaves, strict=True))
     if isinstance(variable, ScalarVariable):
-        return tidy(body.diff(variable).xreplace(back))
+        found = tidy(body.diff(variable).xreplace(back))
+        for dummy, leaf in zip(dummies, leaves, strict=True):
+            if variable in leaf.free_symbols:
+                found = found + tidy(body.diff(dummy).xreplace(back)) * _through_coefficients(leaf, variable)
+        return found
     total: Ranked = variable.linear(())
     for dummy, leaf in zip(dummies, leaves, strict=True):
         weight = body.diff(dummy)
@@ -78,6 +80,23 @@ def partial(expression: Expr, variable: Any) -> Any:
             slope = atom_of(leaf).gradient(leaf, variable)
             if slope.rank == variable.rank and slope.terms():
                 total = total + tidy(weight.xreplace(back)) * slope
+    return total
+
+
+def _through_coefficients(leaf: Invariant, variable: ScalarVariable) -> Expr:
+    """∂l/∂v of an invariant whose arguments hold v in their coefficients (a thermal strain): Σ ∂l/∂T : ∂T/∂v."""
+    from .invariants import inner, tr
+
+    total: Expr = S.Zero
+    for place, quantity in enumerate(leaf.args):
+        if not isinstance(quantity, Ranked) or variable not in quantity.free_symbols:
+            continue
+        change = quantity.linear((a, c.diff(variable)) for a, c in quantity.terms().items())
+        probe = VectorSymbol("probe") if quantity.rank == 1 else TensorSymbol("probe")
+        opened = leaf.func(*(probe if i == place else a for i, a in enumerate(leaf.args)))
+        slope = atom_of(leaf).gradient(opened, probe).xreplace({probe: quantity})
+        spherical = change.terms().get(identity) if set(change.terms()) == {identity} else None
+        total = total + (spherical * tr(slope) if spherical is not None else inner(slope, change))
     return total
 
 
