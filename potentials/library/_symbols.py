@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from ..scalars import parameter, scalar
-from ..tensor import sym_tensor
+from .. import parameter, scalar, sym_tensor, temperature
 
 eps = sym_tensor("eps")
 eps_p = sym_tensor("eps_p")
+eps_v = sym_tensor("eps_v")
 alpha = sym_tensor("alpha")
 p = scalar("p")
+v = scalar("v")
+T = temperature("T")
 
 E = parameter("E", lower=0, unit="Pa", note="Young's modulus")
 nu = parameter("nu", lower=-1, upper=0.5, unit="1", note="Poisson ratio")
@@ -18,6 +20,27 @@ lambda_w = parameter("lambda_w", lower=0, unit="Pa", note="first Lamé modulus o
 mu_w = parameter("mu_w", lower=0, unit="Pa", note="second Lamé modulus of the wires")
 H_k = parameter("H_k", lower=0, unit="Pa", note="hardening, kinematic")
 H_i = parameter("H_i", lower=0, unit="Pa", note="hardening, isotropic")
+H_c = parameter("H_c", lower=0, unit="Pa", note="hardening of the cap")
 C_0 = parameter("C_0", lower=0, unit="Pa", note="cohesion: shear limit √J₂ at zero pressure")
 theta_f = parameter("theta_f", lower=0, upper=1.57, unit="rad", note="friction angle: √J₂ = C_0 + P tan(theta_f)")
+theta_0 = parameter("theta_0", lower=0, upper=1.57, unit="rad", note="friction angle of the virgin state")
+p_m = parameter("p_m", lower=0, unit="1", note="plastic strain at which half of the gain of friction is mobilised")
 sigma_y = parameter("sigma_y", lower=0, unit="Pa", note="yield stress in uniaxial tension")
+sigma_t = parameter("sigma_t", lower=0, unit="Pa", note="tensile strength")
+phi = parameter("phi", lower=0, upper=1.57, unit="rad", note="friction angle of Mohr–Coulomb")
+c = parameter("c", lower=0, unit="Pa", note="cohesion of Mohr–Coulomb")
+M = parameter("M", lower=0, unit="1", note="slope of the critical state line, q = M P")
+a = parameter("a", lower=0, unit="Pa", note="half of the preconsolidation pressure")
+L = parameter("L", lower=0, unit="Pa", note="pressure at which the cap begins")
+W = parameter("W", lower=0, unit="Pa", note="width of the cap in pressure: it ends at L + W")
+r = parameter("r", lower=0, unit="1", note="height of the cap over its width, in √J₂ over pressure")
+sigma_0 = parameter("sigma_0", lower=0, unit="Pa", note="reference (drag) stress")
+rate_0 = parameter("rate_0", lower=0, unit="1/s", note="plastic strain rate at the reference stress")
+n = parameter("n", lower=1, unit="1", note="exponent of the rate")
+eta = parameter("eta", lower=0, unit="Pa.s", note="shear viscosity")
+zeta = parameter("zeta", lower=0, unit="Pa.s", note="bulk viscosity")
+tau_y = parameter("tau_y", lower=0, unit="Pa", note="yield stress in shear")
+alpha_T = parameter("alpha_T", lower=0, unit="1/K", note="linear thermal expansion")
+T_0 = parameter("T_0", lower=0, unit="K", note="temperature of the stress-free state")
+C_v = parameter("C_v", lower=0, unit="J/(m3.K)", note="heat capacity per volume at constant strain")
+k = parameter("k", lower=0, unit="W/(m.K)", note="heat conductivity")

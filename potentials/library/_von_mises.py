@@ -7,12 +7,8 @@ from __future__ import annotations
 
 from sympy import Rational, sqrt
 
-from ..extended import indicator
-from ..invariants import inner, norm
-from ..law import Law
-from ..roles import forces
-from ..stiffness import isotropic
-from ..tensor import dev
+from .. import Law, dev, forces, indicator, inner, isotropic, norm
+from ._entry import Entry, WorkedValue
 from ._symbols import E, H_i, H_k, alpha, eps, eps_p, nu, p, sigma_y
 
 A, chi, R = forces(eps_p, alpha, p, names="A chi R")
@@ -24,4 +20,16 @@ von_mises = Law(
     observable=eps,
     internal=(eps_p, alpha, p),
     note="von Mises plasticity, linear kinematic and isotropic hardening",
+)
+
+ENTRY = Entry(
+    von_mises,
+    source="von Mises 1913; Prager 1955 (kinematic hardening)",
+    values=dict(E=208e9, nu=0.3, sigma_y=250e6, H_k=4e9, H_i=6e9),
+    worked=WorkedValue(
+        eps=(0, 0, 0, 0, 0, 2**0.5 * 4e-3),
+        stress=(0, 0, 0, 0, 0, 232163046.61940566),
+        source="closed form, simple shear: Δp = (√3·2μ ε₁₂ − σ_y)/(3μ + H_k + H_i), σ₁₂ = 2μ ε₁₂ − √3 μ Δp, μ = 80 GPa",
+        state=dict(p=0.0034340500673763256),
+    ),
 )
