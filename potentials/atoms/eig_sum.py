@@ -79,6 +79,24 @@ class EigSum(Atom):
         function, values = node.args[0], eigenvalues(arguments[1])
         return evaluate(function.expr, {function.variables[0]: values}).sum(axis=-1)
 
+    def conic(self, node: Any, arguments: tuple[Any, ...], constraints: list[Any]) -> Any:
+        """Σ g(μ_i) with the eigenvalues of T majorised by μ₁ ≥ μ₂ ≥ μ₃ (Ben-Tal & Nemirovski 2001, §4.2): μ₃ I ⪯ T ⪯ μ₁ I, Σ μ_i = tr T."""
+        import cvxpy
+        import numpy as np
+
+        from ..conic_form import Frame, conic_expression
+        from ..spectral import as_matrix
+
+        function, matrix = node.args[0], as_matrix(arguments[1])
+        mu = cvxpy.Variable(3)
+        constraints += [mu[0] >= mu[1], mu[1] >= mu[2], cvxpy.sum(mu) == cvxpy.trace(matrix)]
+        constraints += [mu[0] * np.eye(3) - matrix >> 0, matrix - mu[2] * np.eye(3) >> 0]
+        total: Any = 0.0
+        for i in range(3):
+            frame = Frame({function.variables[0]: i}, 3, {})
+            total = total + conic_expression(function.expr, frame, mu, constraints)
+        return total
+
 
 def eig_sum(function: Any, tensor: SymmetricTensor) -> Expr:
     """Σ g(t_i) over the eigenvalues of `tensor`; `function` maps a scalar to a scalar, for example `lambda x: pos(x)**3`."""

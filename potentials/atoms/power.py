@@ -66,8 +66,12 @@ class Power(Atom):
             return cvxpy.square(base)
         if exponent > 1.0:
             # |x|^n <= t, by a power cone: t^(1/n) 1^(1-1/n) >= |x|
+            if not base.is_affine() and not base.is_nonneg():
+                raise DeclarationError(f"the base of {node} may be negative; write pos(...) of it")
             inside, top = cvxpy.Variable(), cvxpy.Variable()
             constraints.append(inside == base if base.is_affine() else inside >= base)
+            if exponent % 2.0 != 0.0 and not base.is_nonneg():
+                constraints.append(inside >= 0)  # convex on the base >= 0 only, which is its domain
             constraints.append(cvxpy.PowCone3D(top, cvxpy.Constant(1.0), inside, 1.0 / exponent))
             return top
         if exponent == 0.5:

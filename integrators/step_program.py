@@ -1,0 +1,273 @@
+"""The implicit step as one small cone program whose data are affine in (ε, old state, …): assembly, reduction, scaling.
+
+    W(d) = min_x ½ xᵀPx + …   over the increments, the multipliers of φ* and auxiliary unknowns,
+
+from two canonical forms: ψ over (ε, X), and either φ* over the forces Y or φ over the rates. φ* enters through its dual,
+
+    dt φ(D/dt) = sup_{v = (Y, aux)} Y·D − dt (½ vᵀPv + qᵀv)  s.t. h − Gv ∈ K, Ev = e
+               = min_{z ∈ K*, y, r} hᵀz + eᵀy + |r|²/(2 dt)  s.t. Gᵀz + Eᵀy + Fᵀr + dt q = (D, 0),   P = FᵀF,
+
+so that X = X_n + D is a linear function of the multipliers and the step is one minimisation (Rockafellar 1970, §30). Equalities are
+eliminated by an orthonormal basis of their null space; the quadratic is brought to the identity on its range; every cone block is scaled to
+norm one. Stress and forces are derivatives of W by its data (envelope theorem), exact also where ψ has kinks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .canonical import CanonicalForm, Cone, dual_cones
+
+__all__ = ["FlowForm", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates"]
+
+Array = NDArray[np.float64]
+RANK = 1e-10
+
+
+@dataclass(frozen=True)
+class FlowForm:
+    """dt φ(D/dt) = min ½ wᵀPw + qᵀw over w with D = L w + l₀ on `moved` places of (ε, X), E w = e₀, h − G w ∈ K."""
+
+    P: Array
+    q: Array
+    L: Array
+    l0: Array
+    E: Array
+    e0: Array
+    G: Array
+    h: Array
+    cones: tuple[Cone, ...]
+
+
+def _factor_of(P: Array) -> Array:
+    """F with P = FᵀF; an eigenvalue of the wrong sign beyond rounding is refused earlier."""
+    values, vectors = np.linalg.eigh(P) if P.size else (np.zeros(0), np.zeros((0, 0)))
+    keep = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
+    return np.sqrt(values[keep])[:, None] * vectors[:, keep].T
+
+
+def flow_of_dual(form: CanonicalForm, dt: float) -> FlowForm:
+    """From φ* over (Y, aux): unknowns (z, y, r), see the module's docstring."""
+    F = _factor_of(form.P)
+    k, cone_rows, equal_rows = form.first, form.G.shape[0], form.E.shape[0]
+    maps = np.vstack([form.G, form.E, F]).T
+    size = maps.shape[1]
+    P = np.zeros((size, size))
+    P[cone_rows + equal_rows :, cone_rows + equal_rows :] = np.eye(F.shape[0]) / dt
+    q = np.concatenate([form.h, form.e, np.zeros(F.shape[0])])
+    G = np.zeros((cone_rows, size))
+    G[:, :cone_rows] = -np.eye(cone_rows)
+    return FlowForm(
+        P, q, maps[:k], dt * form.q[:k], maps[k:], -dt * form.q[k:], G, np.zeros(cone_rows), dual_cones(form.cones)
+    )
+
+
+def flow_of_rates(form: CanonicalForm, dt: float) -> FlowForm:
+    """From φ over (rates, aux): D = dt · rates."""
+    size, k = form.q.size, form.first
+    L = np.zeros((k, size))
+    L[:, :k] = dt * np.eye(k)
+    return FlowForm(dt * form.P, dt * form.q, L, np.zeros(k), form.E, form.e, form.G, form.h, form.cones)
+
+
+@dataclass(frozen=True)
+class StepProgram:
+    """Reduced program min ½ yᵀ diag(p) y + qᵀy s.t. h − Gy ∈ K, q = q0 + q1 d, h = h0 + h1 d; d = (ε, X_n, ε_n if `strain_flows`).
+
+    W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution.
+    """
+
+    p: Array
+    G: Array
+    q0: Array
+    q1: Array
+    h0: Array
+    h1: Array
+    C: Array
+    c1: Array
+    c0: float
+    cones: tuple[Cone, ...]
+    increment_0: Array
+    increment_d: Array
+    increment_y: Array
+    misfit_0: Array
+    misfit_d: Array
+    state_size: int
+    strain_flows: bool
+    unbounded: bool
+
+    def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array]:
+        """(kinds, starts, sizes, exponents)."""
+        kinds = np.array([c.kind for c in self.cones], dtype=np.int64)
+        sizes = np.array([c.size for c in self.cones], dtype=np.int64)
+        starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if sizes.size else sizes
+        return kinds, starts, sizes, np.array([c.alpha for c in self.cones], dtype=float)
+
+    def increments(self, data: Array, y: Array) -> Array:
+        """X − X_n, shape (n, state_size)."""
+        return self.increment_0 + data @ self.increment_d.T + y @ self.increment_y.T
+
+
+def assemble(
+    energy: CanonicalForm, flow: FlowForm | None, moved: Sequence[int], state_size: int, strain_flows: bool
+) -> StepProgram:
+    """The step of ψ = `energy` over (ε, X, aux) with `flow` on the places `moved` of (ε, X) (ε: 0 … 5)."""
+    m = state_size
+    width = 6 + m + (6 if strain_flows else 0)
+    aux = energy.q.size - energy.first
+    flows = 0 if flow is None else flow.q.size
+    n = aux + flows
+    # B: (1, d, x) ↦ (ε, X, aux of ψ); x = (aux, w)
+    size = 6 + m + aux
+    B = np.zeros((size, 1 + width + n))
+    B[: 6 + m, 1 : 7 + m] = np.eye(6 + m)
+    B[6 + m :, 1 + width : 1 + width + aux] = np.eye(aux)
+    E_rows: list[Array] = []
+    if flow is not None:
+        places = np.asarray(moved)
+        internal = places >= 6
+        B[places[internal], 1 + width + aux :] += flow.L[internal]
+        B[places[internal], 0] += flow.l0[internal]
+        if strain_flows:
+            # L w + l₀ = ε − ε_n
+            row = np.zeros((6, 1 + width + n))
+            row[:, 0] = flow.l0[~internal]
+            row[:, 1 + width + aux :] = flow.L[~internal]
+            row[:, 1:7] -= np.eye(6)
+            row[:, 7 + m : 13 + m] += np.eye(6)
+            E_rows.append(row)
+        row = np.zeros((flow.E.shape[0], 1 + width + n))
+        row[:, 0] = -flow.e0
+        row[:, 1 + width + aux :] = flow.E
+        E_rows.append(row)
+    W = np.zeros((flows, 1 + width + n))
+    W[:, 1 + width + aux :] = np.eye(flows)
+    row = energy.E @ B
+    row[:, 0] -= energy.e
+    E_rows.append(row)
+    E = np.vstack(E_rows)
+    G_energy = energy.G @ B
+    h_energy = -G_energy[:, : 1 + width].copy()
+    h_energy[:, 0] += energy.h
+    G, H = G_energy[:, 1 + width :], h_energy
+    cones = energy.cones
+    if flow is not None:
+        h_flow = np.zeros((flow.G.shape[0], 1 + width))
+        h_flow[:, 0] = flow.h
+        G = np.vstack([G, flow.G @ W[:, 1 + width :]])
+        H = np.vstack([H, h_flow])
+        cones = cones + flow.cones
+    # quadratic form in (1, d, x)
+    full = B.T @ energy.P @ B
+    slope = B.T @ energy.q
+    if flow is not None:
+        full += W.T @ flow.P @ W
+        slope += W.T @ flow.q
+    full[0, :] += slope
+    full[:, 0] += slope
+    return _reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows)
+
+
+def _column_scale(P: Array, E: Array, G: Array) -> Array:
+    """Positive column scales that bring [P; E; G] near unit size (Ruiz), rows of E and G being free to scale."""
+    n = P.shape[0]
+    scale = np.ones(n)
+    rows = np.vstack([E, G])
+    left = np.ones(rows.shape[0])
+    for _ in range(12):
+        inside = np.abs(P * scale[:, None] * scale[None, :])
+        outside = np.abs(rows * left[:, None] * scale[None, :])
+        size = np.maximum(np.sqrt(inside.max(axis=0, initial=0.0)), outside.max(axis=0, initial=0.0))
+        size = np.where(size > 0.0, size, 1.0)
+        scale /= np.sqrt(size)
+        outside = np.abs(rows * left[:, None] * scale[None, :])
+        across = outside.max(axis=1, initial=0.0)
+        left /= np.sqrt(np.where(across > 0.0, across, 1.0))
+    return scale
+
+
+def _reduce(
+    full: Array, E: Array, G: Array, H: Array, cones: tuple[Cone, ...], X: Array, width: int, m: int, strain_flows: bool
+) -> StepProgram:
+    """Eliminate equalities, whiten, scale; arguments are maps of (1, d, x) (H of (1, d))."""
+    k = 1 + width
+    n = full.shape[0] - k
+    scale = _column_scale(full[k:, k:], E[:, k:], G)
+    D = np.ones(k + n)
+    D[k:] = scale
+    full, E, X = full * D[:, None] * D[None, :], E * D, X * D
+    G = G * scale
+    sizes = np.linalg.norm(E[:, k:], axis=1)
+    E = E / np.where(sizes > 0.0, sizes, 1.0)[:, None]
+    u, s, vt = np.linalg.svd(E[:, k:]) if E.size else (np.zeros((0, 0)), np.zeros(0), np.eye(n))
+    rank = int((s > RANK * s.max(initial=0.0)).sum())
+    misfit = u[:, rank:].T @ E[:, :k] if E.size else np.zeros((0, k))
+    misfit = misfit[np.abs(misfit).max(axis=1, initial=0.0) > 1e-12]
+    N = vt[rank:].T
+    # x = S (1, d) + N y
+    S = -(vt[:rank].T / s[:rank]) @ (u[:, :rank].T @ E[:, :k]) if rank else np.zeros((n, k))
+    S[np.abs(S) < 1e-15 * np.abs(S).max(initial=0.0)] = 0.0
+    whole = np.vstack([np.hstack([np.eye(k), np.zeros((k, N.shape[1]))]), np.hstack([S, N])])
+    full = whole.T @ full @ whole
+    X = X @ whole
+    H = H - G @ S
+    G = G @ N
+    # whiten: P = I on its range
+    P = full[k:, k:]
+    values, vectors = np.linalg.eigh(0.5 * (P + P.T)) if P.size else (np.zeros(0), np.zeros((0, 0)))
+    strong = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
+    T = vectors / np.sqrt(np.where(strong, values, 1.0))
+    G = G @ T
+    blocks = np.zeros(G.shape[0])
+    start = 0
+    for cone in cones:
+        rows = slice(start, start + cone.size)
+        if cone.kind == 0:
+            for r in range(start, start + cone.size):
+                blocks[r] = np.linalg.norm(G[r]) or 1.0
+        else:
+            blocks[rows] = np.linalg.norm(G[rows], 2) or 1.0
+        start += cone.size
+    # directions without curvature: orthonormal images under the scaled constraints
+    unbounded = False
+    p = np.where(strong, 1.0, 0.0)
+    if not strong.all():
+        free = T[:, ~strong]
+        images = (G / blocks[:, None])[:, ~strong]
+        _, s, vt = np.linalg.svd(images, full_matrices=False) if images.size else (0, np.zeros(0), np.zeros((0, 0)))
+        live = s > 1e-9 * max(float(s.max(initial=0.0)), 1e-300)
+        directions = vt[live].T / s[live]
+        T = np.hstack([T[:, strong], T[:, ~strong] @ directions])
+        G = np.hstack([G[:, strong], G[:, ~strong] @ directions])
+        # what neither curves nor meets a constraint must not be pulled at
+        lost = np.eye(images.shape[1]) - vt[live].T @ vt[live] if images.size else np.eye(images.shape[1])
+        pull = lost @ free.T @ full[k:, :k]
+        unbounded = bool(np.abs(pull).max(initial=0.0) > 1e-9 * np.abs(full[k:, :k]).max(initial=0.0))
+        p = np.concatenate([np.ones(int(strong.sum())), np.zeros(directions.shape[1])])
+    G, H = G / blocks[:, None], H / blocks[:, None]
+    linear = T.T @ full[k:, :k]
+    return StepProgram(
+        p,
+        np.ascontiguousarray(G),
+        linear[:, 0].copy(),
+        np.ascontiguousarray(linear[:, 1:]),
+        H[:, 0].copy(),
+        np.ascontiguousarray(H[:, 1:]),
+        np.ascontiguousarray(full[1:k, 1:k]),
+        full[1:k, 0].copy(),
+        0.5 * float(full[0, 0]),
+        cones,
+        X[:, 0].copy(),
+        X[:, 1:k] - np.hstack([np.zeros((m, 6)), np.eye(m), np.zeros((m, width - 6 - m))]),
+        X[:, k:] @ T,
+        misfit[:, 0].copy(),
+        misfit[:, 1:].copy(),
+        m,
+        strain_flows,
+        unbounded,
+    )
