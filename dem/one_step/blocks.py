@@ -35,20 +35,18 @@ class Blocks:
     q: Array
     mu: Array
     scale: Array  # (n,) c a: r = scale x
+    mobility: Array  # (n,) 1/a²: W_NN of the problem given
+    smooth: NDArray[np.bool_]  # (n,) without friction in the problem given
 
     def reactions(self, x: Array) -> Array:
-        """r (3n,) of the scaled x (n, 3)."""
-        return (self.scale[:, None] * x).ravel()
+        """r (3n,) of the scaled x (n, 3); no tangential part where there is no friction."""
+        r = self.scale[:, None] * x
+        r[self.smooth, 1:] = 0.0
+        return r.ravel()
 
     def unknowns(self, r: Array) -> Array:
         """x (n, 3) of the reactions r (3n,)."""
         return r.reshape(-1, 3) / self.scale[:, None]
-
-    @property
-    def matrix(self) -> sp.csr_matrix:
-        """W̄ (3n, 3n) in compressed rows."""
-        n = len(self.mu)
-        return sp.csr_matrix(sp.bsr_matrix((self.value, self.column, self.pointer), shape=(3 * n, 3 * n)))
 
 
 def scaled_blocks(problem: OneStepProblem) -> Blocks:
@@ -75,7 +73,7 @@ def scaled_blocks(problem: OneStepProblem) -> Blocks:
     q[smooth, 1:] = 0.0
     scaled = value.copy()
     _scale_blocks(pointer, column, scaled, a, smooth)
-    return Blocks(pointer, column, scaled, place, q, mu, c * a)
+    return Blocks(pointer, column, scaled, place, q, mu, c * a, normal, smooth)
 
 
 def _with_diagonal(matrix: sp.csr_matrix, n: int) -> sp.bsr_matrix:

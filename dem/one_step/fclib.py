@@ -78,7 +78,9 @@ def write_fclib(problem: OneStepProblem, path: Path | str, *, description: str =
         partial.replace(path)
     except OSError as fault:
         partial.unlink(missing_ok=True)
-        raise StorageError(f"{path}: not written ({' '.join(str(fault).split())[:120]}): choose another place") from None
+        raise StorageError(
+            f"{path}: not written ({' '.join(str(fault).split())[:120]}): choose another place"
+        ) from None
 
 
 def _read(file: h5py.File) -> OneStepProblem:
@@ -86,23 +88,31 @@ def _read(file: h5py.File) -> OneStepProblem:
     if not roots:
         rolling = [name for name in file if name.startswith("fclib")]
         found = f"it holds {rolling[0]}" if rolling else "it holds neither fclib_local nor fclib_global"
-        raise InputError(f"no problem that fenchel solves: {found}; 3D Coulomb friction (fclib_local, fclib_global) is read")
+        raise InputError(
+            f"no problem that fenchel solves: {found}; 3D Coulomb friction (fclib_local, fclib_global) is read"
+        )
     root = file[roots[0]]
     dimension = int(np.ravel(_data(root, "spacedim"))[0])
     if dimension != 3:
         kind = {2: "a plane problem (two rows a contact)", 5: "a rolling-friction problem (five rows a contact)"}
-        raise InputError(f"spacedim = {dimension}, {kind.get(dimension, 'unknown to FCLIB')}: only 3 (normal, two tangents) is solved")
+        raise InputError(
+            f"spacedim = {dimension}, {kind.get(dimension, 'unknown to FCLIB')}: only 3 (normal, two tangents) is solved"
+        )
     vectors = root.get("vectors")
     if vectors is None:
         raise InputError(f"{roots[0]}/vectors is missing: it holds mu and q (local) or f and w (global)")
     mu, title = _vector(vectors, "mu"), _title(root)
     if roots[0] == "fclib_local":
         if "V" in root or "R" in root:
-            raise InputError("the problem has bilateral constraints (V, R): only contacts are solved; condense the constraints first")
+            raise InputError(
+                "the problem has bilateral constraints (V, R): only contacts are solved; condense the constraints first"
+            )
         rows = 3 * len(mu)
         return OneStepProblem.local(_matrix(root, "W", rows, rows), _vector(vectors, "q"), mu, title=title)
     if "G" in root:
-        raise InputError("the problem has bilateral constraints (G): only contacts are solved; condense the constraints first")
+        raise InputError(
+            "the problem has bilateral constraints (G): only contacts are solved; condense the constraints first"
+        )
     f = _vector(vectors, "f")
     mass, h = _matrix(root, "M", len(f), len(f)), _matrix(root, "H", len(f), 3 * len(mu))
     return OneStepProblem.of_bodies(mass, h, f, _vector(vectors, "w"), mu, title=title)
@@ -124,7 +134,11 @@ def _vector(group: Any, name: str) -> np.ndarray:
 def _title(root: Any) -> str:
     node = root.get("info/title")
     value = node[()] if node is not None else b""
-    return bytes(np.ravel(value)[0] if np.ndim(value) else value).decode("utf-8", "replace").strip("\0 \n") if value is not None else ""
+    return (
+        bytes(np.ravel(value)[0] if np.ndim(value) else value).decode("utf-8", "replace").strip("\0 \n")
+        if value is not None
+        else ""
+    )
 
 
 def _matrix(root: Any, name: str, rows: int, columns: int) -> sp.csr_matrix:
@@ -146,7 +160,9 @@ def _matrix(root: Any, name: str, rows: int, columns: int) -> sp.csr_matrix:
         _inside(name, p, columns)
         return sp.csr_matrix((x, (i, p)), shape=(rows, columns))
     if kind not in (-1, -2):
-        raise InputError(f"{name} has nz = {kind}: -2 (compressed rows), -1 (compressed columns) or a number of triplets is known")
+        raise InputError(
+            f"{name} has nz = {kind}: -2 (compressed rows), -1 (compressed columns) or a number of triplets is known"
+        )
     major, minor = (rows, columns) if kind == -2 else (columns, rows)
     if len(p) < major + 1 or p[0] != 0 or np.any(np.diff(p[: major + 1]) < 0) or p[major] > min(len(i), len(x)):
         raise InputError(f"{name} has pointers that do not fit its {major} {'rows' if kind == -2 else 'columns'}")
@@ -160,7 +176,9 @@ def _matrix(root: Any, name: str, rows: int, columns: int) -> sp.csr_matrix:
 
 def _inside(name: str, index: np.ndarray, bound: int) -> None:
     if index.size and (index.min() < 0 or index.max() >= bound):
-        raise InputError(f"{name} has the index {int(index.max() if index.max() >= bound else index.min())} outside 0 ... {bound - 1}")
+        raise InputError(
+            f"{name} has the index {int(index.max() if index.max() >= bound else index.min())} outside 0 ... {bound - 1}"
+        )
 
 
 def _write_matrix(root: Any, name: str, matrix: Any) -> None:

@@ -137,7 +137,9 @@ def _divide(mass: sp.csr_matrix, right: sp.csr_matrix) -> sp.csr_matrix:
     if sizes.max() == 1:
         diagonal = mass.diagonal()
         if np.any(diagonal == 0.0):
-            raise InputError(f"M has a zero on its diagonal (row {int(np.argmin(np.abs(diagonal)))}): every body needs a mass")
+            raise InputError(
+                f"M has a zero on its diagonal (row {int(np.argmin(np.abs(diagonal)))}): every body needs a mass"
+            )
         return sp.csr_matrix(sp.diags(1.0 / diagonal) @ right)
     if sizes.max() <= _LARGEST_BLOCK:
         return sp.csr_matrix(_inverse_of_blocks(mass, label, count) @ right)
@@ -145,9 +147,7 @@ def _divide(mass: sp.csr_matrix, right: sp.csr_matrix) -> sp.csr_matrix:
         factor = splu(sp.csc_matrix(mass))
     except RuntimeError as failure:
         raise InputError("M is singular: every body needs a mass and an inertia") from failure
-    columns = [
-        sp.csr_matrix(factor.solve(right[:, k : k + 256].toarray())) for k in range(0, right.shape[1], 256)
-    ]
+    columns = [sp.csr_matrix(factor.solve(right[:, k : k + 256].toarray())) for k in range(0, right.shape[1], 256)]
     return sp.csr_matrix(sp.hstack(columns))
 
 
@@ -160,7 +160,9 @@ def _inverse_of_blocks(mass: sp.csr_matrix, label: NDArray[np.int32], count: int
         try:
             inverse = np.linalg.inv(mass[dofs][:, dofs].toarray())
         except np.linalg.LinAlgError as failure:
-            raise InputError(f"M is singular in the block of row {dofs[0]}: every body needs a mass and an inertia") from failure
+            raise InputError(
+                f"M is singular in the block of row {dofs[0]}: every body needs a mass and an inertia"
+            ) from failure
         rows.append(np.repeat(dofs, len(dofs)))
         columns.append(np.tile(dofs, len(dofs)))
         values.append(inverse.ravel())

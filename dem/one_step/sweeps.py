@@ -18,7 +18,9 @@ Ints = NDArray[np.int32]
 
 
 @njit
-def sweep(pointer: Ints, column: Ints, value: Array, place: Ints, q: Array, mu: Array, x: Array, backward: bool) -> float:
+def sweep(
+    pointer: Ints, column: Ints, value: Array, place: Ints, q: Array, mu: Array, x: Array, backward: bool
+) -> float:
     """One sweep over all contacts, `x` (n, 3) in place; returns the squared change."""
     change = 0.0
     n = len(mu)
