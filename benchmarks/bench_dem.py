@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 
 from fenchel.dem import Assembly, Drive, Simulation, Solver
-from fenchel.dem.nlgs import solve
 from fenchel.dem.preparation import make_sample, material_of, preparation
 from fenchel.dem.scene import Grains, Sample, SceneSolve, Wires
 
@@ -15,7 +16,7 @@ SWEEPS = 50
 
 
 @pytest.fixture(scope="module")
-def problem():
+def problem() -> tuple[Simulation, dict[str, Any]]:
     grains, wires = Grains(count=1000, normal_stiffness=4.3e4), Wires(count=75)
     assembly: Assembly = make_sample(grains, wires, Sample(), 1)
     stage = preparation(grains, wires, Sample(), SceneSolve(), PRESSURE)[0](assembly)
@@ -23,33 +24,31 @@ def problem():
         stage.advance()
     simulation = Simulation(assembly, material_of(grains, wires), Solver())
     step = 0.05 * 2.0 * assembly.grain_radius * np.sqrt(grains.density / PRESSURE)
-    _, free, _, box, _, rows = simulation.assemble(step, Drive(pressure=np.full(3, PRESSURE)))
-    return free, box, rows
+    return simulation, simulation.problem(step, Drive(pressure=np.full(3, PRESSURE)))
 
 
 def test_sweeps(benchmark, problem) -> None:
-    free, box, rows = problem
-    count = len(rows.pair) + len(rows.wall) + len(rows.link)
+    simulation, arguments = problem
+    rows = arguments["contacts"]
+    count = len(rows.pair) + len(rows.touching) + len(rows.link)
+    start = rows.row.copy()
 
     def sweep() -> None:
-        solve(
-            free.copy(), box.copy(), rows.pair, rows.contact.copy(), rows.wall, rows.wall_row.copy(), rows.link, rows.link_row.copy(),
-            rows.cn, rows.ct, True, True, 0.0, 1e-30, SWEEPS,
-        )  # fmt: skip
+        rows.row[:] = start
+        simulation.sweep(arguments, tolerance=0.0, sweep_limit=SWEEPS)
 
     benchmark(sweep)
     benchmark.extra_info["rows"] = count
-    benchmark.extra_info["bytes per contact"] = rows.contact.itemsize * rows.contact.shape[1] + rows.pair.itemsize * 2
+    benchmark.extra_info["bytes per row"] = simulation.kernels.bytes_per_contact()
     if benchmark.stats is not None:
-        benchmark.extra_info["million contact-iterations per second"] = round(
-            count * SWEEPS / benchmark.stats["median"] / 1e6, 1
-        )
+        rate = count * SWEEPS / benchmark.stats["median"] / 1e6
+        benchmark.extra_info["million contact-iterations per second"] = round(rate, 1)
 
 
 def test_copy_of_the_rows(benchmark, problem) -> None:
     """Reading and writing every row once per sweep: the traffic that a sweep cannot avoid."""
-    rows = problem[2]
-    source, target = rows.contact, np.empty_like(rows.contact)
+    source = problem[1]["contacts"].row
+    target = np.empty_like(source)
 
     def copies() -> None:
         for _ in range(SWEEPS):

@@ -1,6 +1,6 @@
-"""The state of a sample: spheres (grains and beads), a box of six frictionless walls, links, and the impulses carried over.
+"""The state of a sample: spheres or disks (grains and beads), a box of frictionless walls, links, and the impulses carried over.
 
-Positions are those of the mid configuration of the leap-frog form of Moreau–Jean (θ = ½): detection there, x ← x + h v.
+Positions are those of the mid configuration of the leap-frog form of Moreau–Jean, q_m = q + h(1−θ)v: detection there, x ← x + h v.
 """
 
 from __future__ import annotations
@@ -18,31 +18,37 @@ Array = NDArray[np.float64]
 
 @dataclass
 class Assembly:
-    """Everything a step needs and nothing that it can derive; arrays over bodies (n), links (m), candidates (c).
+    """Everything a step needs and nothing that it can derive; arrays over bodies (n), links (m), candidates (c), planes (k).
 
-    Box: |x_a| ≤ half_a with one degree of freedom per axis, the half length; both walls of a pair move symmetrically.
+    In two dimensions (d = 2) bodies are disks and nothing has a third component; `spin` then has one column. Where no body turns it has
+    none. Box: |x_a| ≤ half_a with one degree of freedom per axis, the half length; both walls of a pair move symmetrically; half
+    lengths inf: no box. A body of infinite mass is fixed.
     """
 
-    x: Array  # (n, 3) centres [m]
+    x: Array  # (n, d) centres [m]
     radius: Array  # (n,) [m]
-    mass: Array  # (n,) [kg]
+    mass: Array  # (n,) [kg], inf: fixed
     wire: NDArray[np.int64]  # (n,) wire of a bead, -1 for a grain
     rank: NDArray[np.int64]  # (n,) place along the wire
-    velocity: Array  # (n, 3) [m/s]
-    spin: Array  # (n, 3) radius times angular velocity [m/s]
-    half: Array  # (3,) half lengths of the box [m]
-    box_velocity: Array  # (3,) of the half lengths [m/s]
-    box_mass: Array  # (3,) of a pair of walls [kg]
+    velocity: Array  # (n, d) [m/s]
+    spin: Array  # (n, 3), (n, 1) or (n, 0) radius times angular velocity [m/s]
+    locked: NDArray[np.bool_]  # (n,) bodies that do not turn
+    half: Array  # (d,) half lengths of the box [m]
+    box_velocity: Array  # (d,) of the half lengths [m/s]
+    box_mass: Array  # (d,) of a pair of walls [kg]
+    plane_place: Array  # (k,) n·x of the planes [m]
+    plane_velocity: Array  # (k,) along their normals [m/s]
     links: NDArray[np.int32]  # (m, 2) consecutive beads
     link_length: Array  # (m,) reference length [m]
     link_impulse: Array  # (m,) tension impulse of the last step [N s]
     pairs: NDArray[np.int32]  # (c, 2) candidates
-    pair_impulse: Array  # (c, 4) of the last step: tangential part on the first body, and pressure [N s]
-    walls: NDArray[np.int32]  # (w, 3) candidates (body, axis, side)
-    wall_impulse: Array  # (w,) [N s]
-    listed_x: Array  # (n, 3) positions when the candidates were listed
-    listed_half: Array  # (3,)
+    pair_impulse: Array  # (c, d + 1) of the last step: tangential part on the first body, and pressure [N s]; (c, 1) without friction
+    walls: NDArray[np.int32]  # (w, 2) candidates (body, plane); planes 2 axis and 2 axis + 1 are those of the box
+    wall_impulse: Array  # (w, 1 or d + 1) [N s]
+    listed_x: Array  # (n, d) positions when the candidates were listed
+    listed_place: Array  # places of walls and planes then
     apart: int = 1  # least difference of ranks at which beads of one wire may touch
+    listed_reach: float = 0.0  # the largest gap of a contact for which they were listed [m]
     step: float = 0.0  # the step that the impulses belong to [s]; 0: none yet
     elastic_energy: float = 0.0  # stored in contacts and links [J]
     time: float = 0.0  # [s]
@@ -53,14 +59,23 @@ class Assembly:
         x: Array,
         radius: Array,
         mass: Array,
-        half: Array,
+        half: Array | None = None,
         *,
         wire: NDArray[np.int64] | None = None,
         rank: NDArray[np.int64] | None = None,
         box_mass: Array | None = None,
+        locked: NDArray[np.bool_] | None = None,
     ) -> Assembly:
-        """Spheres at rest in a box; `wire` and `rank` say which of them are beads of which wire (links join neighbours)."""
-        n = x.shape[0]
+        """Spheres, or disks where x has two columns, at rest; `half` None: no box.
+
+        `wire` and `rank` say which of them are beads of which wire (links join neighbours), `locked` which do not turn; without friction
+        nothing turns anyway.
+        """
+        n, d = x.shape
+        half = np.full(d, np.inf) if half is None else half
+        locked = np.zeros(n, dtype=bool) if locked is None else np.array(locked, dtype=bool)
+        turning = 0 if n and locked.all() else 3 if d == 3 else 1
+        moving = np.isfinite(mass)
         wire = np.full(n, -1, dtype=np.int64) if wire is None else wire
         rank = np.zeros(n, dtype=np.int64) if rank is None else rank
         beads = np.flatnonzero(wire >= 0)
@@ -77,20 +92,25 @@ class Assembly:
             mass=np.array(mass, dtype=float),
             wire=wire,
             rank=rank,
-            velocity=np.zeros((n, 3)),
-            spin=np.zeros((n, 3)),
+            velocity=np.zeros((n, d)),
+            spin=np.zeros((n, turning)),
+            locked=locked,
             half=np.array(half, dtype=float),
-            box_velocity=np.zeros(3),
-            box_mass=np.full(3, 0.4 * mass.sum()) if box_mass is None else np.array(box_mass, dtype=float),
+            box_velocity=np.zeros(d),
+            box_mass=np.full(d, 0.4 * mass[moving].sum() or 1.0)
+            if box_mass is None
+            else np.array(box_mass, dtype=float),
+            plane_place=np.zeros(0),
+            plane_velocity=np.zeros(0),
             links=links,
             link_length=lengths,
             link_impulse=np.zeros(len(links)),
             pairs=np.empty((0, 2), dtype=np.int32),
-            pair_impulse=np.zeros((0, 4)),
-            walls=np.empty((0, 3), dtype=np.int32),
-            wall_impulse=np.zeros(0),
-            listed_x=np.full((n, 3), np.inf),
-            listed_half=np.full(3, np.inf),
+            pair_impulse=np.zeros((0, 1)),
+            walls=np.empty((0, 2), dtype=np.int32),
+            wall_impulse=np.zeros((0, 1)),
+            listed_x=np.full((n, d), np.inf),
+            listed_place=np.zeros(0),
             apart=apart,
         )
 
@@ -100,15 +120,27 @@ class Assembly:
         return self.wire >= 0
 
     @property
+    def dimension(self) -> int:
+        """2 or 3."""
+        return self.x.shape[1]
+
+    @property
+    def boxed(self) -> bool:
+        """Whether there is a box."""
+        return bool(np.all(np.isfinite(self.half)))
+
+    @property
     def grain_radius(self) -> float:
-        """Mean radius of the grains [m]."""
-        grains = ~self.is_bead
+        """Mean radius of the grains that can move, else of all bodies [m]."""
+        grains = ~self.is_bead & np.isfinite(self.mass)
+        if not len(self.radius):
+            return 1.0
         return float(self.radius[grains].mean() if grains.any() else self.radius.mean())
 
     @property
     def volume(self) -> float:
-        """Of the box [m3]."""
-        return float(8.0 * np.prod(self.half))
+        """Of the box [m3], inf without a box."""
+        return float(np.prod(2.0 * self.half))
 
     def solid_fraction(self, *, grains_only: bool = False) -> float:
         """Volume of spheres over the volume of the box."""
@@ -142,4 +174,4 @@ class Assembly:
             self.link_impulse = np.zeros(len(self.links))
 
 
-_SCALARS = {"apart": int, "step": float, "elastic_energy": float, "time": float}
+_SCALARS = {"apart": int, "listed_reach": float, "step": float, "elastic_energy": float, "time": float}

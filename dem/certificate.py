@@ -17,7 +17,6 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
 from .stepping import Drive, Simulation
-from .wires import WIRE_LAWS
 
 __all__ = ["ContactProgram", "contact_program"]
 
@@ -103,10 +102,12 @@ def contact_program(simulation: Simulation, step: float, drive: Drive) -> Contac
 
     Raises `InputError` when the material has friction: the step is then no convex program (theory §10).
     """
-    law = simulation.material
-    if law.friction > 0.0 or law.bead_friction > 0.0:
+    if simulation.kernels.rule.friction or any(plane.friction for plane in simulation.planes):
         raise InputError("a step with Coulomb friction is no convex program: set friction = 0, or read the natural map")
-    probe = Simulation(simulation.assembly.copy(), law, simulation.solver, skin=simulation.skin)
+    if simulation.planes or simulation.kernels.dimension != 3:
+        raise InputError("the convex program is written for a box in three dimensions: leave planes out")
+    wire = simulation.kernels.wire
+    probe = Simulation(simulation.assembly.copy(), simulation.laws, simulation.solver, skin=simulation.skin)
     _, free, _, box_free, _, rows = probe.assemble(step, drive)
     bodies = len(free)
     count = len(rows.pair) + len(rows.wall) + len(rows.link)
@@ -125,7 +126,7 @@ def contact_program(simulation: Simulation, step: float, drive: Drive) -> Contac
         h[k, 3 * bodies + axis] = 1.0
         compliance[k], shift[k] = rows.cn, row[1]
         k += 1
-    tension_only = WIRE_LAWS[law.wire_law].unilateral
+    tension_only = wire is not None and wire.rule().unilateral
     for (i, j), row in zip(rows.link, rows.link_row, strict=True):
         h[k, 3 * i : 3 * i + 3] = -row[0:3]
         h[k, 3 * j : 3 * j + 3] = row[0:3]

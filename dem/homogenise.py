@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..cache import njit
 from .bodies import Assembly
-from .stepping import Contacts
+from .rows import Contacts
 
 __all__ = ["fit_sums", "moments", "wall_stress"]
 
@@ -107,7 +107,8 @@ def moments(assembly: Assembly, rows: Contacts, radius: float) -> Array:
 def wall_stress(rows: Contacts) -> Array:
     """Normal stresses on the three pairs of walls [Pa], tension positive, shape (3,): mean over both walls of a pair."""
     area = 4.0 * np.prod(rows.half) / rows.half
-    force = np.bincount(rows.wall[:, 1], weights=rows.wall_row[:, 0], minlength=3) / rows.step
+    body_force = np.abs(np.sum(rows.wall_impulse, axis=1))  # one component each
+    force = np.bincount(rows.touching[:, 1] // 2, weights=body_force, minlength=3) / rows.step
     return -force / (2.0 * area)
 
 

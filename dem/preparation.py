@@ -49,7 +49,7 @@ class IsotropicStage:
         quench: float = 0.0,
         to_rest: bool = True,
     ) -> None:
-        self.simulation = Simulation(assembly, material, solver)
+        self.simulation = Simulation(assembly, material, solver, reach=0.04 * assembly.grain_radius)
         self.name = name
         self.slacken = slacken
         self.to_rest = to_rest

@@ -21,7 +21,7 @@ from ..errors import InputError, StorageError
 
 __all__ = ["UNITS", "load_run", "replace_file", "save_run"]
 
-FORMAT = 2
+FORMAT = 3
 
 UNITS = {
     "pressure": "Pa", "axial_strain": "1", "wall_strain": "1", "wall_stress": "Pa", "box_stress": "Pa", "octant_volume": "m3",

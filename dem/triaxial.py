@@ -92,7 +92,7 @@ class TriaxialTest:
     ) -> None:
         if not pressure > 0.0:
             raise InputError(f"pressure = {pressure} Pa: grains without cohesion need a positive confining pressure")
-        self.simulation = Simulation(assembly, material, solver)
+        self.simulation = Simulation(assembly, material, solver, reach=0.04 * assembly.grain_radius)
         self.name = f"triaxial at {pressure / 1e3:g} kPa"
         self.pressure = pressure
         self.path = tuple(float(e) for e in strain_path)

@@ -7,8 +7,9 @@ import pytest
 
 from fenchel.dem import Assembly, Drive, Material, Simulation, Solver
 from fenchel.dem.certificate import contact_program
-from fenchel.dem.contacts import collect_contacts, keep_contacts
 from fenchel.dem.detection import find_pairs
+from fenchel.dem.kernels import SceneKernels
+from fenchel.dem.laws import CompliantSignoriniCoulomb
 from fenchel.dem.packing import densify
 from fenchel.dem.stepping import Contacts
 from fenchel.errors import ConvergenceError, InputError
@@ -254,19 +255,29 @@ def test_a_pair_that_turns_as_a_whole_carries_its_forces_along() -> None:
     x = np.array([[0.0, 0.0, -0.99 * radius], [0.0, 0.0, 0.99 * radius]])
     impulse = np.array([[2e-6, 0.0, 0.0, 5e-6]])
     pairs = np.array([[0, 1]], dtype=np.int32)
-    velocity = np.zeros((2, 8))
-    velocity[:, 6] = 1e5
+    law = CompliantSignoriniCoulomb(friction=1.0, k_n=stiffness, k_t=stiffness)
+    kernels = SceneKernels(dimension=3, spin="all", contact=law)
+    assert kernels.pairs is not None
+    code, starts = kernels.pairs.module, kernels.pairs.columns.starts
+    velocity = np.zeros((2, kernels.body_columns.total))
+    velocity[:, kernels.body_columns.starts["w"]] = 1e5
     c, s = np.cos(0.05), np.sin(0.05)
     turn = np.array([[c, 0.0, s], [0.0, 1.0, 0.0], [-s, 0.0, c]])
     compliance = 1.0 / (stiffness * h**2)
     force = np.array([2e-6, 0.0, 0.0])
+    pair, row = np.zeros((1, 2), dtype=np.int32), np.zeros((1, kernels.pairs.columns.total))
+    cold, candidate = np.zeros((1, 2)), np.zeros(1, dtype=np.int32)
     for _ in range(10):
         x, force = x @ turn.T, turn @ force
-        _, row = collect_contacts(
-            x, np.full(2, radius), velocity, np.zeros(2, dtype=bool), pairs, impulse, radius, h, compliance, compliance, 1.0, 1.0, True
+        count = code.collect(
+            x, np.full(2, radius), velocity, np.zeros(2, dtype=bool), pairs, impulse, np.array(law.parameters()), radius, h,
+            pair, row, cold, candidate, compliance, compliance, 1.0,
         )  # fmt: skip
-        keep_contacts(row, impulse)
-    assert row[0, 14] == pytest.approx(5e-6, rel=1e-12) and impulse[0, 3] == pytest.approx(5e-6, rel=1e-12)
+        assert count == 1
+        code.keep(row, candidate, impulse)
+    assert cold[0, 1] == pytest.approx(5e-6, rel=1e-12) and impulse[0, 3] == pytest.approx(5e-6, rel=1e-12)
+    e = starts["e"]
+    np.testing.assert_allclose(row[0, e : e + 3], force, rtol=0, atol=1e-18)
     np.testing.assert_allclose(impulse[0, :3], force, rtol=0, atol=1e-18)
 
 

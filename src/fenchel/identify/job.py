@@ -7,6 +7,7 @@ import platform
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -94,19 +95,23 @@ def _warm_up(study: Study) -> None:
     """Compile the kernels once here, so that the worker processes find them on the disk."""
     import numpy as np
 
-    from ..dem.stepping import Drive, Material, Simulation, Solver
+    from ..dem.preparation import material_of
+    from ..dem.stepping import Drive, Simulation, Solver
     from ..dem.triaxial import TriaxialTest
 
     x = np.array([[0.0, 0.0, -0.5e-3], [0.0, 0.0, 0.5e-3]])
     pair = Assembly.of_spheres(
         x, np.full(2, 0.5e-3), np.full(2, 1e-5), np.full(3, 1e-3), wire=np.zeros(2, dtype=np.int64), rank=np.arange(2)
     )
-    for friction in (0.0, 0.4):
-        Simulation(
-            pair.copy(), Material(friction=friction, bead_friction=friction), Solver(keep_unconverged=True)
-        ).advance(1e-5, Drive())
+    law = material_of(study.grains, study.wires)
+    smooth = replace(law, friction=study.sample.friction, bead_friction=study.sample.friction)
+    rigid = replace(law, normal_stiffness=np.inf, tangential_stiffness=np.inf)
+    # what preparation, tests, controls and probes ask for: each combination is code of its own
+    for kind in (smooth, law, rigid):
+        for links in {False, kind.links}:
+            Simulation(pair.copy(), replace(kind, links=links), Solver(keep_unconverged=True)).advance(1e-5, Drive())
     test = TriaxialTest(
-        pair, Material(), Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3)
+        pair, law, Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3)
     )
     test.advance()
 
