@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sympy import AccumBounds, Derivative, DiracDelta, Expr, Heaviside, I, Piecewise, S, Symbol, sign, sympify
+from sympy import AccumBounds, Derivative, DiracDelta, Expr, Heaviside, I, Piecewise, S, Symbol, sign
 
 from ..errors import DeclarationError
 from .atoms import ATOMS
@@ -22,6 +22,9 @@ if TYPE_CHECKING:
     from .law import Law
 
 __all__ = ["check_declaration", "normalise", "stress_of"]
+
+
+_NOT_FINITE = (S.NaN, S.ComplexInfinity, S.Infinity, S.NegativeInfinity, I, AccumBounds)
 
 
 def normalise(law: Law) -> dict[str, Any]:
@@ -46,20 +49,27 @@ def normalise(law: Law) -> dict[str, Any]:
         if value is not None:
             found[key] = as_extended(value, f"{rule}: {key}")
     if law.density is not None:
-        density = sympify(law.density, strict=True) if not isinstance(law.density, (str, Ranked)) else None
-        if not isinstance(density, Expr) or variables_of(density) or density.is_nonpositive:
-            raise DeclarationError(
-                f"{rule}: density must be a positive number or a parameter [kg/m3], not {law.density}"
-            )
-        found["density"] = density
+        found["density"] = _density(law.density, rule)
+    if not isinstance(law.note, str):
+        raise DeclarationError(f"{rule}: note must be text, not {type(law.note).__name__}")
     found["internal"] = _tuple(law.internal)
     if law.irreversible is not None:
         found["irreversible"] = _tuple(law.irreversible)
     return found
 
 
+def _density(value: Any, rule: str) -> Expr:
+    remedy = "density must be a positive number or an expression in parameters [kg/m3]"
+    density = scalar_expression(value, f"{rule}: density", remedy)
+    if variables_of(density) or density.is_nonpositive or (density.is_number and not density.is_positive):
+        raise DeclarationError(f"{rule}: {remedy}, not {density}")
+    if density.has(*_NOT_FINITE):
+        raise DeclarationError(f"{rule}: {remedy}, finite and real, not {density}")
+    return density
+
+
 def _tuple(value: Any) -> tuple[Any, ...]:
-    return (value,) if isinstance(value, (Ranked, Expr)) else tuple(value)
+    return tuple(value) if isinstance(value, (tuple, list)) else (value,)
 
 
 def stress_of(law: Law) -> TensorSymbol | None:
@@ -157,7 +167,7 @@ def _names(law: Law, rule: str, declared: set[Any]) -> None:
 
 
 def _expression(rule: str, what: str, expression: Expr, declared: set[Any], roles: tuple[str, ...]) -> None:
-    if expression.has(S.NaN, S.ComplexInfinity, S.Infinity, S.NegativeInfinity, I, AccumBounds):
+    if expression.has(*_NOT_FINITE):
         raise DeclarationError(
             f"{rule}: {what} holds a number that is not finite and real; write finite real coefficients"
         )
@@ -188,6 +198,11 @@ def _expression(rule: str, what: str, expression: Expr, declared: set[Any], role
 
 def _functions(rule: str, what: str, expression: Any) -> None:
     """Every function must have an atom, or hold parameters only."""
+    if isinstance(expression, Ranked):
+        raise DeclarationError(
+            f"{rule}: rank mismatch: {what} holds a function of the {expression.kind} {expression}; scalar functions take scalars, "
+            "for example norm, tr, inner, eig_max of it; eig_sum(g, T) sums g over its eigenvalues"
+        )
     if expression.is_Atom or not variables_of(expression):
         return
     if type(expression) not in ATOMS and expression.func.__name__ not in ("Add", "Mul"):

@@ -13,6 +13,7 @@ from sympy import Expr, S, latex, sstr, sympify
 
 from ..errors import DeclarationError
 from .atoms.maximum import rewrite_maximum
+from .derivative import variables_of
 from .ranked import Ranked
 
 __all__ = ["Extended", "as_extended", "indicator", "scalar_expression"]
@@ -26,7 +27,7 @@ def scalar_expression(value: Any, what: str, remedy: str) -> Expr:
         found = sympify(value, strict=True)
     except Exception:
         found = None
-    if not isinstance(found, Expr):
+    if not isinstance(found, Expr) or getattr(found, "is_Matrix", False):
         raise DeclarationError(f"{what} must be a scalar expression, not {type(value).__name__}; {remedy}")
     return rewrite_maximum(found)
 
@@ -51,8 +52,25 @@ class Extended:
 
     __radd__ = __add__
 
+    def __sub__(self, other: Any) -> Extended:
+        return self + (-as_extended(other, "a term subtracted from an indicator"))
+
+    def __rsub__(self, other: Any) -> Extended:
+        return -self + other
+
+    def __neg__(self) -> Extended:
+        if self.surfaces:
+            raise DeclarationError("an indicator cannot be subtracted: minus infinity outside a set is not convex")
+        return Extended(-self.finite)
+
+    def __pow__(self, other: Any) -> Extended:
+        raise DeclarationError("an indicator has no power; write indicator(f) + h(f) with a convex h")
+
     def __mul__(self, other: Any) -> Extended:
-        factor = scalar_expression(other, "the factor of a potential", "multiply by a positive number or parameter")
+        remedy = "multiply by a positive number or parameter"
+        factor = scalar_expression(other, "the factor of a potential", remedy)
+        if factor.is_nonpositive or variables_of(factor):
+            raise DeclarationError(f"the factor {factor} of a potential is not positive for sure; {remedy}")
         return Extended(factor * self.finite, self.surfaces)
 
     __rmul__ = __mul__

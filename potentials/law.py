@@ -17,12 +17,12 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from sympy import Expr, S, default_sort_key, sstr, sympify
+from sympy import Expr, S, default_sort_key, sstr
 
 from ..errors import DeclarationError, InputError
 from .declaration import check_declaration, normalise
 from .derivative import partial
-from .extended import Extended
+from .extended import Extended, scalar_expression
 from .scalars import Parameter, ScalarVariable, Temperature
 from .tensor import SymmetricTensor, TensorSymbol
 from .vector import VectorSymbol
@@ -205,10 +205,9 @@ class Law:
         for key, value in expressions.items():
             if key not in known:
                 raise DeclarationError(f"law '{self.name}' has no parameter '{key}'; it has: {', '.join(known)}")
-            new = sympify(value, strict=True)
-            if not isinstance(new, Expr):
-                raise DeclarationError(f"parameter '{key}' must be replaced by a scalar expression")
-            table[known[key]] = new
+            table[known[key]] = scalar_expression(
+                value, f"the replacement of parameter '{key}'", "write an expression in numbers and parameters"
+            )
         changed = {}
         for key in ("psi", "psi_star", "density", "phi", "phi_star"):
             value = getattr(self, key)

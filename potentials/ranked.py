@@ -13,7 +13,7 @@ from sympy import Basic, Expr, Integer, S, Tuple, default_sort_key, sympify
 
 from ..errors import DeclarationError
 
-__all__ = ["Ranked", "scalar_operand", "sorted_terms"]
+__all__ = ["Ranked", "rank_word", "scalar_operand", "sorted_terms"]
 
 
 def scalar_operand(value: object, action: str, kind: str = "tensor") -> Expr:
@@ -31,6 +31,13 @@ def scalar_operand(value: object, action: str, kind: str = "tensor") -> Expr:
     if number is S.NaN or number.has(S.NaN, S.ComplexInfinity, S.Infinity, S.NegativeInfinity):
         raise DeclarationError(f"a coefficient of a {kind} must be finite")
     return number
+
+
+def rank_word(value: object) -> str:
+    """What a value is, as a word in messages: "tensor", "vector", "scalar", or the name of its type."""
+    if isinstance(value, Ranked):
+        return value.kind
+    return "scalar" if isinstance(value, (Expr, int, float)) else type(value).__name__
 
 
 class Ranked(Basic):
@@ -90,6 +97,11 @@ class Ranked(Basic):
 
     def __pow__(self, other: object) -> Any:
         raise DeclarationError(f"rank mismatch: a {self.kind} has no power; write inner(a, a) or norm(a)**n")
+
+    _eval_power = __pow__  # sympy's sqrt asks here
+
+    def __abs__(self) -> Any:
+        raise DeclarationError(f"rank mismatch: a {self.kind} has no absolute value; write norm(a)")
 
     def _shown(self, printer: Any, latex: bool) -> str:
         """Text of an atom; sums are written by `shown_sum`."""

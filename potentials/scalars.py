@@ -149,13 +149,19 @@ def parameter(
 ) -> Parameter:
     """Declare one parameter. `lower`, `upper` are closed bounds on its value, `default` is used where no value is given."""
     checked_name(name, "parameter")
+    for word, value in (("lower", lower), ("upper", upper), ("default", default)):
+        if value is not None and (isinstance(value, (str, bytes, bool)) or not hasattr(value, "__float__")):
+            raise DeclarationError(f"parameter '{name}': {word} must be a number, not {type(value).__name__}")
+    for word, value in (("unit", unit), ("note", note)):
+        if not isinstance(value, str):
+            raise DeclarationError(f"parameter '{name}': {word} must be text, not {type(value).__name__}")
     low = -math.inf if lower is None else float(lower)
     high = math.inf if upper is None else float(upper)
     if not low <= high:
         raise DeclarationError(f"parameter '{name}': the lower bound {low:g} must not exceed the upper bound {high:g}")
     if default is not None and not low <= float(default) <= high:
         raise DeclarationError(f"parameter '{name}': the default {default:g} lies outside [{low:g}, {high:g}]")
-    return Parameter(name, low, high, str(unit), None if default is None else float(default), str(note))
+    return Parameter(name, low, high, unit, None if default is None else float(default), note)
 
 
 def parameters(names: str) -> Any:

@@ -5,8 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Expr, sympify
+from sympy import Expr
 
+from .extended import scalar_expression
 from .invariants import inner, tr
 from .tensor import SymmetricTensor, identity
 
@@ -36,7 +37,8 @@ class IsotropicStiffness:
 
 def lame(E: Any, nu: Any) -> tuple[Expr, Expr]:
     """(λ, μ) = (Eν/((1+ν)(1−2ν)), E/(2(1+ν)))."""
-    young, poisson = sympify(E, strict=True), sympify(nu, strict=True)
+    remedy = "write a number or an expression in parameters"
+    young, poisson = scalar_expression(E, "Young's modulus", remedy), scalar_expression(nu, "Poisson's ratio", remedy)
     return young * poisson / (1 + poisson) / (1 - 2 * poisson), young / 2 / (1 + poisson)
 
 

@@ -17,7 +17,7 @@ from sympy.core.symbol import Str
 
 from ..errors import DeclarationError
 from .names import checked_name, latex_name
-from .ranked import Ranked, shown_term, sorted_terms
+from .ranked import Ranked, rank_word, shown_term, sorted_terms
 
 __all__ = [
     "Deviator",
@@ -211,7 +211,7 @@ def sym_tensor(name: str) -> TensorSymbol:
 def dev(tensor: SymmetricTensor) -> SymmetricTensor:
     """Deviator A − (tr A) I/3."""
     if not isinstance(tensor, SymmetricTensor):
-        raise DeclarationError("rank mismatch: dev takes a tensor, not a scalar")
+        raise DeclarationError(f"rank mismatch: dev takes a tensor, not a {rank_word(tensor)}")
     return Deviator(tensor)
 
 

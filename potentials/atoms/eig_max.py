@@ -7,6 +7,7 @@ from typing import Any
 from sympy import Expr, S
 
 from ...errors import DeclarationError
+from ..ranked import rank_word
 from ..spectral import EigenDyad, as_matrix, eigenvalues
 from ..tensor import PositiveTensor, SymmetricTensor
 from .atom import Atom, Invariant
@@ -59,7 +60,7 @@ class EigMax(Atom):
 def checked_tensor(value: object, word: str) -> SymmetricTensor:
     """A tensor without positive parts; refuses the rest in one line."""
     if not isinstance(value, SymmetricTensor):
-        raise DeclarationError(f"rank mismatch: {word} takes a tensor, not a {getattr(value, 'kind', 'scalar')}")
+        raise DeclarationError(f"rank mismatch: {word} takes a tensor, not a {rank_word(value)}")
     if value.has(PositiveTensor):
         raise DeclarationError(f"{word}(pos(...)) is not available; write pos({word}(...)), which is the same number")
     return value

@@ -10,7 +10,8 @@ from typing import Any
 
 from sympy import Expr, Function, S
 
-from ..ranked import scalar_operand
+from ...errors import DeclarationError
+from ..ranked import Ranked, scalar_operand
 from ..tensor import PositiveTensor, SymmetricTensor
 from .atom import Atom
 
@@ -143,4 +144,6 @@ def pos(value: Any) -> Any:
     """Positive part: ⟨x⟩ = max(x, 0) of a scalar, the spectral positive part of a tensor."""
     if isinstance(value, SymmetricTensor):
         return PositiveTensor(value)
+    if isinstance(value, Ranked):
+        raise DeclarationError(f"rank mismatch: pos takes a scalar or a tensor, not a {value.kind}")
     return PositivePart(scalar_operand(value, "taking pos of", "scalar"))

@@ -8,6 +8,7 @@ from sympy import Expr, S
 
 from ...errors import DeclarationError
 from ..operator import Operator
+from ..ranked import rank_word
 from ..tensor import Deviator, IdentityTensor, PositiveTensor, SymmetricTensor, TensorSum, from_terms, identity
 from .atom import Atom, Invariant
 from .linear import linear_part
@@ -55,7 +56,7 @@ class Trace(Atom):
 def tr(tensor: SymmetricTensor) -> Expr:
     """Trace; of a positive part tr T^≥ = Σ ⟨t_i⟩."""
     if not isinstance(tensor, SymmetricTensor):
-        raise DeclarationError(f"rank mismatch: tr takes a tensor, not a {getattr(tensor, 'kind', 'scalar')}")
+        raise DeclarationError(f"rank mismatch: tr takes a tensor, not a {rank_word(tensor)}")
     terms = tensor.terms()
     rest = from_terms({a: c for a, c in terms.items() if not isinstance(a, (IdentityTensor, Deviator, PositiveTensor))})
     total = 3 * sum((c for a, c in terms.items() if isinstance(a, IdentityTensor)), S.Zero)
