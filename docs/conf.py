@@ -22,6 +22,7 @@ extensions = [
     "api_pages",
     "command_line",
     "file_keys",
+    "law_library",
     "prose",
 ]
 exclude_patterns = ["_build", "_generate", "**.ipynb_checkpoints"]

@@ -14,7 +14,8 @@ def test_the_law_of_the_readme_is_admissible():
     assert len(blocks) == 1
     found: dict = {}
     exec(blocks[0], found)
-    report = found["soil"].check(E=1e7, nu=0.2, H_k=1e6, H_i=5e5, C_0=3e3, theta_f=0.1)
+    values = dict(E_s=1e7, nu_s=0.2, lambda_w=1e5, mu_w=1e5, H_k=1e6, H_i=5e5, C_0=3e3, theta_f=0.1)
+    report = found["soil"].check(**values)
     assert report.admissible is True
 
 
