@@ -89,6 +89,7 @@ def densify(
     rng: np.random.Generator,
     grain_radius: Array,
     *,
+    walks: Array | None = None,
     wire_count: int = 0,
     beads: int = 0,
     spacing: float = 0.0,
@@ -101,9 +102,11 @@ def densify(
 ) -> Assembly:
     """A sample of grains (radii [m]) and wires in a cube sized for `solid_fraction` (grains and beads).
 
-    Beads have the mass of a mean grain: legitimate without gravity, and it keeps the sweeps few. Raises `InputError` when a wire is
-    longer than fits or bodies are larger than the box.
+    Wires lie as `walks` says, shape (count, beads, 3) [m], or as `lay_wires` does. Beads have the mass of a mean grain: legitimate without
+    gravity, and it keeps the sweeps few. Raises `InputError` when a wire is longer than fits or bodies are larger than the box.
     """
+    if walks is not None:
+        wire_count, beads = walks.shape[:2]
     bead_count = wire_count * beads
     radius = np.concatenate([grain_radius, np.full(bead_count, bead_radius)])
     side = (4.0 / 3.0 * np.pi * np.sum(radius**3) / solid_fraction) ** (1.0 / 3.0)
@@ -115,7 +118,7 @@ def densify(
     n = len(grain_radius)
     x = np.empty((n + bead_count, 3))
     x[:n] = rng.uniform(-half, half, size=(n, 3))
-    x[n:] = lay_wires(rng, wire_count, beads, spacing, half).reshape(-1, 3)
+    x[n:] = (lay_wires(rng, wire_count, beads, spacing, half) if walks is None else walks).reshape(-1, 3)
     wire = np.concatenate([np.full(n, -1), np.repeat(np.arange(wire_count), beads)]).astype(np.int64)
     rank = np.concatenate([np.zeros(n), np.tile(np.arange(beads), wire_count)]).astype(np.int64)
     mean_mass = float(density * 4.0 / 3.0 * np.pi * np.mean(grain_radius**3))
