@@ -4,9 +4,9 @@ With s = ‖u_T‖ frozen and W symmetric, the problem is the second-order cone 
 
     min J(r) = ½ r·W r + (q + μ s n)·r ,   r ∈ K ,
 
-and a reaction solves the frictional problem exactly when it solves its own program. Hence a **certificate** that shares nothing with the
-other solvers: J at the reaction against the optimum of clarabel. Without friction the program is the QP min ½ r_N·W_NN r_N + q_N·r_N, r_N ≥ 0,
-equivalently an LCP. The fixed point s ← ‖u_T(s)‖ is a solver too, slow where friction couples strongly.
+and a reaction solves the frictional problem exactly when it solves its own program. Hence a **certificate** that shares nothing with
+the other solvers: J at the reaction against the optimum of clarabel. Without friction it is the QP min ½ r_N·W_NN r_N + q_N·r_N over
+r_N ≥ 0, equivalently an LCP. The fixed point s ← ‖u_T(s)‖ is a solver too, slow where friction couples strongly.
 """
 
 from __future__ import annotations

@@ -45,7 +45,7 @@ def solve_nlgs(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, pati
         if monitor(x):
             return
         errors.append(min(before, monitor.error))
-        if done >= 100 and len(errors) > 4:
+        if np.isfinite(patience) and done >= 100 and len(errors) > 4:
             half = len(errors) // 2
             rate = np.log(errors[half] / errors[-1]) / ((len(errors) - 1 - half) * batch)
             if np.log(errors[-1] / monitor.tolerance) > patience * max(rate, 0.0):

@@ -15,7 +15,6 @@ all bounds and there are only approximate ones.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +33,8 @@ Array = NDArray[np.float64]
 
 _KAPPA = 1.0
 _LONGEST = 0.7  # step along the curve, in the local norm of the worst contact
-_LOOSE = 0.5  # largest correction that a step may leave, in the same norm
+_TIGHT = 0.2  # correction, in the same norm, up to which a point counts as on the curve
+_LOOSE = 0.6  # correction up to which it may be brought there; beyond, the step is repeated at half its length
 
 
 @dataclass
@@ -116,13 +116,14 @@ class _Expansion:
     speed: float
     side: float
 
-    def ahead(self, delta: float) -> tuple[Array, Array, float]:
-        """The point predicted at the distance `delta`."""
+    def ahead(self, delta: float, share: float = 1.0) -> tuple[Array, Array, float]:
+        """The point predicted at the distance `delta`, with a share of the correction."""
         s = self.side * delta / max(self.speed, 1.0)
         h = 0.5 * s * s
-        change = self.dl + s + h * self.al
+        change = share * self.dl + s + h * self.al
         tau = self.at.tau * (1.0 + change) if change > -0.9 else 0.1 * self.at.tau
-        return self.at.x + self.dx + s * self.vx + h * self.ax, self.at.y + self.dy + s * self.vy + h * self.ay, tau
+        x = self.at.x + share * self.dx + s * self.vx + h * self.ax
+        return x, self.at.y + share * self.dy + s * self.vy + h * self.ay, tau
 
 
 def _expand(curve: _Curve, at: _Point) -> tuple[_Expansion, float]:
@@ -157,18 +158,15 @@ def _expand(curve: _Curve, at: _Point) -> tuple[_Expansion, float]:
     return _Expansion(at, dx, dy, dl, vx, vy, ax, ay, al, worst / np.sqrt(size), 1.0), length
 
 
-def solve_homotopy(
-    blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, start: float = 1.0, until: float = np.inf
-) -> None:
-    """Follow the curve from a cold start, polishing by Newton's method once per decade of τ below 1e-6; `limit` counts factorisations,
-    `until` is a reading of `time.thread_time` at which to stop."""
+def solve_homotopy(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, start: float = 1.0) -> None:
+    """Follow the curve from a cold start, polishing by Newton's method once per decade of τ below 1e-6; `limit` counts factorisations."""
     curve = _Curve(blocks, start)
-    at: _Point | None = curve.first
-    curve.point(curve.first.x, curve.first.y, 1.0)
-    expansion: _Expansion | None = None
+    at: _Point | None = curve.point(curve.first.x, curve.first.y, 1.0)
+    base: _Expansion | None = None
     delta, forward, next_polish = 0.5, 0, 1e-6
+    corrections, share, before = 0, 1.0, np.inf
     for _ in range(limit):
-        if time.thread_time() > until or monitor.out_of_time:
+        if at is None or monitor.out_of_time:
             return
         try:
             curve.factorise()
@@ -176,17 +174,16 @@ def solve_homotopy(
             fresh, length = _expand(curve, at)
         except np.linalg.LinAlgError:
             fresh, length = None, np.inf
-        if not np.isfinite(length) and expansion is None:
-            return
-        if fresh is not None and (expansion is None or length <= _LOOSE):
+        if fresh is not None and (base is None or length <= _TIGHT):
             sign = curve.system.sign()
             forward = forward or sign
             fresh.side = -1.0 if sign == forward else 1.0
-            if expansion is not None:
+            if base is not None:
                 delta = min(
-                    _LONGEST, delta * float(np.clip((0.5 * _LOOSE / max(length, 1e-9)) ** (1.0 / 3.0), 0.5, 2.0))
+                    _LONGEST,
+                    delta * (2.0 if corrections == 0 and length < 0.5 * _TIGHT else 1.2 if corrections < 2 else 0.7),
                 )
-            expansion = fresh
+            base, corrections, share, before = fresh, 0, 1.0, np.inf
             if monitor(unfold(at.x, blocks.mu)):
                 return
             if at.tau < next_polish and fresh.side < 0.0:
@@ -194,13 +191,21 @@ def solve_homotopy(
                 polish(blocks, monitor, limit=25, start=unfold(at.x, blocks.mu))
                 if monitor.converged:
                     return
+            at = _advance(curve, base, delta, share)
+        elif fresh is not None and length <= min(_LOOSE, 0.7 * before) and corrections < 4:
+            corrections, before = corrections + 1, length
+            at = _advance(curve, fresh, 0.0, min(1.0, 0.3 / length))
         else:
-            delta *= max(0.25, 0.9 * (0.5 * _LOOSE / length) ** (1.0 / 3.0))
-        at = None
+            at = None
         while at is None:
-            if delta < 1e-7 or expansion is None:
+            # back to the last point on the curve, with a shorter step and, from then on, less trust in its own correction
+            delta, corrections, before = 0.5 * delta, 0, np.inf
+            if base is None or delta < 1e-8:
                 return
-            at = curve.point(*expansion.ahead(delta))
-            if at is not None and not curve.near(at):
-                at = None
-            delta *= 0.5 if at is None else 1.0
+            share = 1.0 if delta > 1e-2 else 0.3
+            at = _advance(curve, base, delta, share)
+
+
+def _advance(curve: _Curve, base: _Expansion, delta: float, share: float) -> _Point | None:
+    at = curve.point(*base.ahead(delta, share))
+    return at if at is not None and curve.near(at) else None

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.linalg import lapack
 from scipy.sparse.linalg import splu
 
 from ...cache import njit
@@ -21,7 +20,7 @@ __all__ = ["BlockSystem"]
 Array = NDArray[np.float64]
 Ints = NDArray[np.int32]
 
-_DENSE = 240  # unknowns up to which a dense factorisation is the faster one
+_DENSE = 120  # unknowns up to which a dense factorisation is the faster one
 
 
 class BlockSystem:
@@ -33,7 +32,8 @@ class BlockSystem:
         self.dense = self.size <= _DENSE
         self._pointer, self._column = blocks.pointer, blocks.column
         if self.dense:
-            self._full = np.zeros((self.size, self.size), order="F")
+            self._lu = np.empty((self.size, self.size))
+            self._pivot = np.empty(self.size, dtype=np.int64)
         else:
             self._set_order(n)
 
@@ -53,9 +53,8 @@ class BlockSystem:
         """Factorise the matrix of the block values (k, 3, 3). Raises `np.linalg.LinAlgError` if it is singular."""
         self._value = value
         if self.dense:
-            _spread(self._pointer, self._column, value, self._full)
-            self._lu, self._pivot, info = lapack.dgetrf(self._full)
-            if info != 0:
+            _spread(self._pointer, self._column, value, self._lu)
+            if not _factorise_dense(self._lu, self._pivot):
                 raise np.linalg.LinAlgError("singular")
             return
         data = value.ravel()[self._from]
@@ -78,7 +77,9 @@ class BlockSystem:
     def _once(self, b: Array) -> Array:
         right = b.ravel()
         if self.dense:
-            return lapack.dgetrs(self._lu, self._pivot, right)[0].reshape(b.shape)
+            out = right.copy()
+            _solve_dense(self._lu, self._pivot, out)
+            return out.reshape(b.shape)
         out = np.empty_like(right)
         out[self._order] = self._factor.solve(right[self._order])
         return out.reshape(b.shape)
@@ -103,6 +104,46 @@ def _spread(pointer: Ints, column: Ints, value: Array, out: Array) -> None:
             for s in range(3):
                 for t in range(3):
                     out[3 * i + s, 3 * j + t] = value[k, s, t]
+
+
+@njit
+def _factorise_dense(a: Array, pivot: NDArray[np.int64]) -> bool:
+    """LU with row exchanges in place. (LAPACK with threads is several times slower at this size.)"""
+    n = a.shape[0]
+    for k in range(n):
+        best = k
+        for i in range(k + 1, n):
+            if abs(a[i, k]) > abs(a[best, k]):
+                best = i
+        pivot[k] = best
+        if not abs(a[best, k]) > 0.0:
+            return False
+        if best != k:
+            for j in range(n):
+                a[k, j], a[best, j] = a[best, j], a[k, j]
+        inverse = 1.0 / a[k, k]
+        for i in range(k + 1, n):
+            if a[i, k] != 0.0:
+                factor = a[i, k] * inverse
+                a[i, k] = factor
+                for j in range(k + 1, n):
+                    a[i, j] -= factor * a[k, j]
+    return True
+
+
+@njit
+def _solve_dense(a: Array, pivot: NDArray[np.int64], b: Array) -> None:
+    n = a.shape[0]
+    for k in range(n):
+        if pivot[k] != k:
+            b[k], b[pivot[k]] = b[pivot[k]], b[k]
+    for i in range(n):
+        for j in range(i):
+            b[i] -= a[i, j] * b[j]
+    for i in range(n - 1, -1, -1):
+        for j in range(i + 1, n):
+            b[i] -= a[i, j] * b[j]
+        b[i] /= a[i, i]
 
 
 @njit

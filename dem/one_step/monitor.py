@@ -60,10 +60,6 @@ class Monitor:
         """Seconds of this thread that are left."""
         return self._deadline - time.thread_time()
 
-    def until(self, share: float, least: float = 0.0) -> float:
-        """The clock (`time.thread_time`) at which `share` of the time left is used up, at least `least` seconds."""
-        return min(self._deadline, time.thread_time() + max(least, share * self.time_left))
-
     def _judge(self, x: Array) -> float:
         """The larger of natural_map_q and natural_map_scaled, by compiled code."""
         b = self.blocks

@@ -1,13 +1,11 @@
 """`auto`: which methods, in which order, for which problem.
 
-Sweeps first (they solve well-posed problems in milliseconds), then the proximal interior point, polished by the proximal Newton method; what
-is still unsolved, and has admissible velocities at all, gets the selective interior point and the global homotopy in turn, each polished.
-Choices depend on sizes and counts, not on clocks, so that a problem solved within its time is solved the same way again.
+Sweeps first: they solve well-posed problems in milliseconds. Then the proximal interior point, polished by the proximal Newton method. What
+is still unsolved and not proved to be without solution gets the homotopy and the selective interior point, the cheaper one first.
+Choices depend on sizes and counts, not on clocks: a problem solved within its time is solved the same way again.
 """
 
 from __future__ import annotations
-
-import time
 
 from .admm import solve_admm
 from .blocks import Blocks
@@ -20,56 +18,57 @@ from .newton import polish
 
 __all__ = ["solve_auto"]
 
-_LARGE = 20_000  # contacts above which no factorisation is tried
-_COARSE = 1e-5  # tolerance above which first-order methods are preferred on large problems
+_TINY = 80  # contacts up to which an interior point solution is cheaper than some hundred sweeps
+_SMALL = 1000  # contacts below which a factorisation costs milliseconds
+_LARGE = 20_000  # contacts above which none is tried
+_COARSE = 1e-5  # tolerance from which on first-order methods are worth more of the time
 
 
 def solve_auto(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
     """Chain the methods until one converges; returns a proof that there is no solution where one was found."""
     n = len(blocks.mu)
-    solve_nlgs(blocks, monitor, limit=100 if n <= _LARGE else 200)
-    if monitor.converged or monitor.out_of_time:
-        return None
-    solve_nlgs(blocks, monitor, limit=2000 if n < 1000 else 1000, patience=400)
-    if monitor.converged or monitor.out_of_time:
-        return None
-    if n > _LARGE:
+    solve_nlgs(blocks, monitor, limit=100)
+    if n <= _TINY and not _finished(monitor):
+        solve_interior(blocks, monitor, limit=40)
+    if not _finished(monitor):
+        solve_nlgs(blocks, monitor, limit=2000, patience=300)
+    if n <= _SMALL and not _finished(monitor):
+        solve_anderson(blocks, monitor, limit=400, patience=100)
+    if n > _LARGE and not _finished(monitor):
         solve_anderson(blocks, monitor)
+    if _finished(monitor):
         return None
     if monitor.tolerance >= _COARSE:
-        solve_admm(blocks, monitor, limit=500, patience=100)
-        if monitor.converged:
+        solve_admm(blocks, monitor, limit=400, patience=100)
+        if _finished(monitor):
             return None
-    solve_interior(blocks, monitor, limit=150, patience=25)
+    solve_interior(blocks, monitor, limit=150, patience=30)
     if _polished(blocks, monitor):
         return None
     proof = find_infeasibility(monitor.problem, time_limit=monitor.time_left)
-    if proof is not None or monitor.out_of_time:
+    if proof is not None or _finished(monitor):
         return proof
-    solve_homotopy(blocks, monitor, until=monitor.until(0.3))
-    if _polished(blocks, monitor):
-        return None
-    solve_interior_selective(blocks, monitor, limit=150, patience=60)
-    if _polished(blocks, monitor):
-        return None
-    for start in (10.0, 0.3, 3.0):
-        solve_homotopy(blocks, monitor, start=start, until=monitor.until(0.5))
+    if n > _SMALL:
+        solve_interior_selective(blocks, monitor, limit=150, patience=40)
         if _polished(blocks, monitor):
             return None
-    while not monitor.out_of_time:
-        before = time.thread_time()
-        solve_anderson(blocks, monitor, patience=2000)
-        if monitor.converged or time.thread_time() - before <= 0.0:
-            break
-        break
+    for start in (1.0, 10.0, 0.1):
+        solve_homotopy(blocks, monitor, limit=3000, start=start)
+        if _polished(blocks, monitor):
+            return None
+    solve_anderson(blocks, monitor)
     return None
+
+
+def _finished(monitor: Monitor) -> bool:
+    return monitor.converged or monitor.out_of_time
 
 
 def _polished(blocks: Blocks, monitor: Monitor) -> bool:
     """Polish the best iterate as long as a round halves the error; whether to stop."""
-    while not (monitor.converged or monitor.out_of_time):
+    while not _finished(monitor):
         before = monitor.error
         polish(blocks, monitor, limit=40)
         if monitor.error > 0.5 * before:
             break
-    return monitor.converged or monitor.out_of_time
+    return _finished(monitor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ from .homotopy import solve_homotopy
 from .interior import solve_interior, solve_interior_selective
 from .measures import ContactErrors, measure, worst_contacts
 from .monitor import Monitor
-from .newton import solve_proximal_newton
+from .newton import polish, solve_proximal_newton
 from .pipeline import solve_auto
 from .problem import OneStepProblem
 
@@ -86,6 +87,7 @@ def solve(
         raise InputError(f"tolerance = {tolerance}: it is positive and finite (1e-8 is usual)")
     if not time_limit > 0.0:
         raise InputError(f"time_limit = {time_limit} s: it is positive")
+    _warm_up()
     began = time.thread_time()
     n = problem.contact_count
     r, proof = np.zeros(3 * n), None
@@ -114,6 +116,15 @@ def solve(
     return solution
 
 
+@functools.cache
+def _warm_up() -> None:
+    """Compile, or load from the cache, what the methods call, on one sliding contact: it shall not count as time of a problem."""
+    problem = OneStepProblem.local(np.eye(3), [-1.0, 2.0, 0.0], [0.5])
+    blocks = scaled_blocks(problem)
+    for run in (solve_nlgs, solve_interior, solve_interior_selective, polish, solve_homotopy):
+        run(blocks, Monitor(problem, blocks, 0.0, 60.0), limit=7)
+
+
 def _given(start: Array | None, n: int) -> Array:
     if start is None:
         return np.zeros(3 * n)
@@ -130,12 +141,12 @@ def describe(problem: OneStepProblem, solution: Solution) -> str:
     if solution.infeasibility is not None:
         proof = solution.infeasibility
         return (
-            f"the problem has no solution: the contacts {', '.join(map(str, proof.contacts))} are squeezed whatever the reactions (proved up to "
-            f"{proof.excluded:.0e} times the natural size of reactions): look at q_N and at driven bodies"
+            f"the problem has no solution: the contacts {', '.join(map(str, proof.contacts))} are squeezed whatever the reactions "
+            f"(proved up to {proof.excluded:.0e} times their natural size): look at q_N and at driven bodies"
         )
     worst = ", ".join(f"{k} ({share:.0%})" for k, share in worst_contacts(problem, solution.r, 3))
     return (
-        f"{solution.solver} stopped after {solution.seconds:.1f} s, {solution.sweeps} sweeps and {solution.factorisations} factorisations at "
+        f"{solution.solver} stopped after {solution.seconds:.1f} s, {solution.sweeps} sweeps, {solution.factorisations} factorisations at "
         f"natural_map_q {e.natural_map_q:.1e} and natural_map_scaled {e.natural_map_scaled:.1e} > {solution.tolerance:.0e} "
         f"(contacts with most of it: {worst}): raise time_limit, loosen tolerance, or try another solver"
     )
