@@ -9,8 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from law_states import derivative, moving, number, random_states, temperatures
-from law_truth import I6, TRUTHS, matrix, turned
+from law_truth import DEV, I6, ROOT2, TRUTHS, matrix, sand_f, stiffness, turned, wire_stress
+from scipy.optimize import root
 
+from fenchel.potentials.derivative import partial
 from fenchel.potentials.library import ENTRIES, LAWS
 
 written = [name for name in LAWS if name in TRUTHS]  # laws that are written a second time
@@ -195,3 +197,180 @@ def test_claim_07_state_laws_are_the_derivatives_of_the_energy(name):
             closed = {truth.plastic: -truth.phase_stress(v, x), law.observable.name: truth.stress(v, x)}
             if key in closed:
                 assert slope == pytest.approx(closed[key], rel=1e-11, abs=1e-11 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("name", written)
+def test_claim_07_stress_formulation_has_the_other_signs(name):
+    """A_m = +∂ψ*/∂α_m and s = +∂ψ*/∂T at fixed stress, ε = ∂ψ*/∂σ: differences of ψ* against the declared state laws."""
+    law, v, truth = truth_of(name)
+    x = {key: value[0] for key, value in random_states(ENTRIES[name], np.random.default_rng(71), 1).items()}
+    if truth.moduli(SimpleNamespace(**v))[1] == 0:  # wires alone: inside the domain of their stress
+        x["eps"] = turned(np.random.default_rng(71), np.array([1.0, 2.0, 3.0])) * 1e-3
+    sigma = number(law.stress, law, v, x)
+    size = np.linalg.norm(x["eps"])
+
+    def slope(key, direction, step):
+        return derivative(lambda s: truth.conjugate(v, sigma, {**x, key: x[key] + s * direction}), 0.0, step)
+
+    rows = {variable.name: number(law.force_laws[variable], law, v, x) for variable in law.internal}
+    if law.temperature is not None:
+        rows["T"] = number(law.entropy, law, v, x)
+    for key, force in rows.items():
+        direction = np.random.default_rng(72).normal(size=np.shape(x[key]))
+        step = 1e-2 if key == "T" else 1e-3 * size
+        assert slope(key, direction, step) == pytest.approx(
+            np.vdot(force, direction), rel=1e-7, abs=1e-9 * np.abs(force).max()
+        )
+    direction = sigma / np.linalg.norm(sigma)
+    found = derivative(lambda s: truth.conjugate(v, sigma + s * direction, x), 0.0, 1e-4 * np.linalg.norm(sigma))
+    assert found == pytest.approx(x["eps"] @ direction, rel=1e-7)
+
+
+@pytest.mark.parametrize("name", [n for n, law in LAWS.items() if law.temperature is not None])
+def test_claim_07_heat_flux_and_temperature_gradient_are_a_dual_pair(name):
+    """φ*_th = k|∇T|²/2T gives −q/T = (k/T) ∇T, φ_th = T|j|²/2k gives ∇T back, and their sum is the dissipation j·∇T."""
+    law, v = LAWS[name], ENTRIES[name].values
+    rng = np.random.default_rng(73)
+    gradient_of_T = law.forces[law.temperature]
+    g, T = rng.normal(size=(50, 3)) * 100.0, 280.0 + 60.0 * rng.random(50)
+    values = {gradient_of_T: g, law.temperature: T}
+    flux = number(partial(law.viscous, gradient_of_T), law, v, {}, symbols=values)
+    assert flux == pytest.approx(v["k"] / T[:, None] * g, rel=1e-12)
+    force = number(law.viscous, law, v, {}, symbols=values)
+    rate = T * (flux**2).sum(1) / (2 * v["k"])
+    assert force + rate == pytest.approx((flux * g).sum(1), rel=1e-12)
+    # q = −T j = −k ∇T runs from warm to cold
+    assert -T[:, None] * flux == pytest.approx(-v["k"] * g, rel=1e-12)
+    # ψ is concave in T: the entropy grows with it
+    x = random_states(ENTRIES[name], rng, 30)
+    warmer = {**x, "T": x["T"] + 20.0}
+    s, s_warmer = (number(law.entropy, law, v, y) for y in (x, warmer))
+    assert (s_warmer > s).all()
+    middle = number(law.energy, law, v, {**x, "T": x["T"] + 10.0})
+    ends = number(law.energy, law, v, x) + number(law.energy, law, v, warmer)
+    assert (middle >= ends / 2).all()
+
+
+# -- claim 9 ---------------------------------------------------------------------------------------------------------------------
+
+
+def reversible_step(truth, v, old, eps):
+    """One implicit step in block 1: ε^r is the variable, σ = ∂ψ̂/∂ε^r the whole stress, and the wires pull on ε^p with A_r = −σ_w.
+
+    Solves ε^r + ε^p = ε, the flow in the normal cone at Y = σ + A_r, χ, R, and f = 0, by Newton on (ε^r, ε^p, γ).
+    """
+    space = SimpleNamespace(**v)
+    lam, mu = truth.moduli(space)
+    elastic, t = stiffness(lam, mu), np.tan(space.theta_f)
+    lam_w, mu_w = truth.wires(space)
+    unit = 1.0 / mu
+
+    def wires(strain):
+        return strain @ stiffness(lam_w, mu_w) if truth.bilateral else wire_stress(strain, lam_w, mu_w)
+
+    def state(z):
+        reversible, plastic, gamma = z[:6], z[6:12], z[12]
+        sigma = elastic @ reversible + wires(reversible + plastic)
+        driving = sigma - wires(reversible + plastic)
+        chi = -space.H_k * (old["alpha"] + plastic - old["eps_p"])
+        forces = {"eps_p": driving, "alpha": chi, "p": -space.H_i * (old["p"] + gamma)}
+        return sigma, forces, truth.f(v, forces, old)[0]
+
+    def flow(forces):
+        deviator = DEV @ (forces["eps_p"] + forces["alpha"])
+        return deviator / (ROOT2 * np.linalg.norm(deviator)) + t / 3 * I6
+
+    def cone(z):
+        _, forces, f = state(z)
+        return np.concatenate([z[:6] + z[6:12] - eps, z[6:12] - old["eps_p"] - z[12] * flow(forces), [unit * f]])
+
+    def apex(z):
+        _, forces, f = state(z)
+        deviator = DEV @ (forces["eps_p"] + forces["alpha"])
+        volume = (z[6:9] - old["eps_p"][:3]).sum() - t * z[12]
+        return np.concatenate([z[:6] + z[6:12] - eps, unit * deviator + volume * I6, [unit * f]])
+
+    start = np.concatenate([eps - old["eps_p"], old["eps_p"], [0.0]])
+    sigma, forces, f = state(start)
+    if f <= 0:
+        return sigma, {**old}
+    size = np.abs(start).max()
+    for residual in (cone, apex):
+        solution = root(lambda y, r=residual: r(y * size) / size, start / size, tol=1e-15)
+        z = solution.x * size
+        sigma, forces, f = state(z)
+        change = z[6:12] - old["eps_p"]
+        admissible = z[12] >= 0 and ROOT2 * np.linalg.norm(DEV @ change) <= z[12] * (1 + 1e-9)
+        aligned = (DEV @ change) @ (DEV @ (forces["eps_p"] + forces["alpha"])) >= -1e-12 * abs(f + space.C_0) * size
+        if np.abs(residual(z)).max() <= 1e-13 * size and admissible and aligned:
+            return sigma, {"eps_p": z[6:12], "alpha": old["alpha"] + change, "p": old["p"] + z[12]}
+    raise AssertionError("block 1 has no solution here")
+
+
+@pytest.mark.parametrize("name", [n for n in written if TRUTHS[n].wires is not None and TRUTHS[n].surfaces is sand_f])
+def test_claim_09_the_split_changes_the_laws_and_not_the_response(name):
+    law, v, truth = truth_of(name)
+    entry = ENTRIES[name]
+    update = law.compile()
+    state, old = None, {"eps_p": np.zeros(6), "alpha": np.zeros(6), "p": 0.0}
+    path = moving(entry, np.random.default_rng(9), 3, 10)
+    path = np.vstack([path, path[-1] + np.linspace(0, 6e-3, 6)[1:, None] * I6])  # ends at the apex
+    largest, apex = 0.0, 0
+    for eps in path:
+        out = update(eps[None, :], state, **v)
+        sigma, old = reversible_step(truth, v, old, eps)
+        largest = max(largest, np.abs(sigma).max())
+        assert out.stress[0] == pytest.approx(sigma, abs=1e-8 * largest)
+        assert out.state["eps_p"][0] == pytest.approx(old["eps_p"], abs=1e-8 * np.abs(path).max())
+        state = out.state
+        B = truth.phase_stress(v, {"eps": eps, **old}) - v["H_k"] * old["alpha"]
+        apex += np.linalg.norm(DEV @ B) < 1e-6 * v["C_0"]
+    assert old["p"] > 0 and apex > 0
+
+
+# -- claim 10 --------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "name", [n for n in written if TRUTHS[n].wires is not None and TRUTHS[n].plastic and not TRUTHS[n].bilateral]
+)
+def test_claim_10_the_conjugate_of_the_parallel_assembly_is_an_infimal_convolution(name):
+    """sup over ε of σ:ε − ψ, by Newton, against min over σ_s + σ_w = σ, a semidefinite program in stresses."""
+    import cvxpy as cp
+
+    law, v, truth = truth_of(name)
+    space = SimpleNamespace(**v)
+    lam, mu = truth.moduli(space)
+    lam_w, mu_w = truth.wires(space)
+    rng = np.random.default_rng(10)
+    x = random_states(ENTRIES[name], rng, 6)
+    for i in range(6):
+        here = {key: value[i] for key, value in x.items()}
+        sigma = number(law.stress, law, v, here)
+        unit = np.abs(sigma).max()
+        sand, y, excess = cp.Variable(6), cp.Variable(nonneg=True), cp.Variable((3, 3), PSD=True)
+        half = np.sqrt(0.5)
+        spherical = [
+            [half**k * (sigma / unit - sand)[place] - (y if a == b else 0) == excess[a, b]]
+            for place, (a, b, k) in enumerate([(0, 0, 0), (1, 1, 0), (2, 2, 0), (1, 2, 1), (0, 2, 1), (0, 1, 1)])
+        ]
+        root_of_compliance = np.linalg.cholesky(np.linalg.inv(stiffness(lam / mu, 1.0))).T
+        objective = cp.sum_squares(root_of_compliance @ sand) / 2 + (mu / unit) * (here["eps_p"] @ sand)
+        objective += mu / (2 * lam_w) * cp.square(y) + mu / (4 * mu_w) * cp.sum_squares(excess)
+        problem = cp.Problem(cp.Minimize(objective), [row for rows in spherical for row in rows])
+        problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-12, tol_gap_rel=1e-12, tol_feas=1e-12)
+        stored = sum(w / 2 * np.vdot(here[key], here[key]) for key, w in truth.weights(space).items())
+        convolution = problem.value * unit**2 / mu - stored
+        assert truth.conjugate(v, sigma, here) == pytest.approx(convolution, rel=1e-7)
+        # the phases share the strain: their stresses are those of the minimiser
+        assert sand.value * unit == pytest.approx(truth.phase_stress(v, here), abs=1e-5 * unit)
+
+
+def test_claim_10_stresses_of_the_phases_add_up_at_equal_strain():
+    v = ENTRIES["texsol"].values
+    strains = moving(ENTRIES["texsol"], np.random.default_rng(101), 40, 1)
+    together = LAWS["texsol"].compile()(strains, None, **v)
+    sand = LAWS["sand"].compile()(strains, None, **{k: x for k, x in v.items() if not k.endswith("_w")})
+    wire = LAWS["wire"].compile()(strains, None, lambda_w=v["lambda_w"], mu_w=v["mu_w"])
+    assert together.stress == pytest.approx(sand.stress + wire.stress, rel=1e-12, abs=1e-9)
+    assert together.state["p"] == pytest.approx(sand.state["p"], rel=1e-12, abs=1e-18)
