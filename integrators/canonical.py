@@ -34,11 +34,12 @@ _DUAL = {
 
 @dataclass(frozen=True)
 class Cone:
-    """One cone: `kind` of `cone_projection`, number of rows, exponent of a power cone."""
+    """One cone: `kind` of `cone_projection` or `scalar_terms`, number of rows, exponent of a power cone, or the numbers of a term."""
 
     kind: int
     size: int
     alpha: float = 0.0
+    beta: float = 0.0
 
 
 def dual_cones(cones: Sequence[Cone]) -> tuple[Cone, ...]:

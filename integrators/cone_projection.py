@@ -14,7 +14,7 @@ from __future__ import annotations
 import math
 
 from ..cache import njit
-from .key import rooms_hash
+from .key import files_hash
 from .spectral import eigen
 
 __all__ = [
@@ -30,7 +30,7 @@ __all__ = [
 
 ORTHANT, SECOND_ORDER, SEMIDEFINITE, EXPONENTIAL, POWER, EXPONENTIAL_DUAL, POWER_DUAL = range(7)
 
-_FOLDER = rooms_hash()
+_FOLDER = files_hash("cone_projection.py", "spectral.py")
 
 
 @njit(folder=_FOLDER)
@@ -281,9 +281,7 @@ def power(x, y, z, alpha, jacobian):
         else:
             high = w
         change = product * (v - u)
-        slope = (
-            alpha * alpha * change / (xn * (2.0 * xn - xs)) + beta * beta * change / (yn * (2.0 * yn - ys)) - v
-        )
+        slope = alpha * alpha * change / (xn * (2.0 * xn - xs)) + beta * beta * change / (yn * (2.0 * yn - ys)) - v
         new = w - gap / slope if slope < 0.0 else math.nan
         if not low < new < high:
             new = 0.5 * (low + high)

@@ -1,6 +1,8 @@
 """The general engine: a small cone program at every point, compiled once per machine; sizes and cones are run-time data.
 
-    min ½ yᵀ diag(p) y + qᵀy   subject to   h − G y ∈ K,    0 ≤ p ≤ 1,    q = q₀ + q₁ d,   h = h₀ + h₁ d,
+    min ½ yᵀ diag(p) y + qᵀy + Σ g(s)   over   s = h − G y ∈ K,    0 ≤ p ≤ 1,    q = q₀ + q₁ d,   h = h₀ + h₁ d,
+
+with scalar convex terms g (see `scalar_terms`) of single entries of s,
 
 d the data of the point (strain, old state, …). Proximal augmented Lagrangian: at multipliers λ ∈ K* the inner problem
 
@@ -19,14 +21,15 @@ import math
 import numpy as np
 
 from ..cache import njit
-from .cone_projection import ORTHANT, SECOND_ORDER, project
-from .key import rooms_hash
+from .cone_projection import ORTHANT, SECOND_ORDER, SEMIDEFINITE, project
+from .key import files_hash
+from .scalar_terms import POWER_TERM, proximal_step, scaled_term
 
 __all__ = ["CONVERGED", "ITERATION_LIMIT", "NOT_FINITE", "ROUNDING", "solve_points"]
 
 CONVERGED, ROUNDING, ITERATION_LIMIT, NOT_FINITE = range(4)
 
-_FOLDER = rooms_hash()
+_FOLDER = files_hash("cone_projection.py", "general.py", "scalar_terms.py", "spectral.py")
 _EPS = 2.220446049250313e-16
 
 
@@ -65,15 +68,24 @@ def _substitute(matrix, right, n):
 
 
 @njit(folder=_FOLDER)
-def _project_all(kinds, starts, sizes, alphas, v, out, jacobians, marks, work):
-    """Π_{K*}(v) cone by cone; the Jacobian of cone b is marked 0, 1 or mixed (2, then in jacobians[b])."""
+def _project_all(kinds, starts, sizes, alphas, betas, tau, v, out, jacobians, marks, work):
+    """Π_{K*}(v) cone by cone, the proximal step for scalar terms; Jacobians are marked 0, 1 or mixed (2, then in jacobians[b]).
+
+    Returns the sum of the scalar terms.
+    """
+    total = 0.0
     for b in range(kinds.size):
-        if kinds[b] == ORTHANT:
+        if kinds[b] >= POWER_TERM:
+            out[starts[b]], jacobians[b, 0, 0], value = proximal_step(kinds[b], alphas[b], betas[b], v[starts[b]], tau)
+            marks[b] = 2
+            total += value
+        elif kinds[b] == ORTHANT:
             for i in range(starts[b], starts[b] + sizes[b]):
                 out[i] = v[i] if v[i] > 0.0 else 0.0
             marks[b] = 2
         else:
             marks[b] = project(kinds[b], alphas[b], v, starts[b], sizes[b], out, jacobians[b], work)
+    return total
 
 
 @njit(folder=_FOLDER)
@@ -138,7 +150,7 @@ def _newton_matrix(p, rho, tau, G, kinds, starts, sizes, v, jacobians, marks, ma
 
 
 @njit(folder=_FOLDER)
-def _level(p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w, jacobians, marks, slope, work):
+def _level(p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, betas, v, w, jacobians, marks, slope, work):
     """Value and slope of the inner problem at y; w = Π_{K*}(λ + τ(Gy − h)). Returns (value, largest entry of the slope)."""
     n, m = p.size, h.size
     for r in range(m):
@@ -146,11 +158,11 @@ def _level(p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w,
         for j in range(n):
             value += G[r, j] * y[j]
         v[r] = lam[r] + tau * value
-    _project_all(kinds, starts, sizes, alphas, v, w, jacobians, marks, work)
+    terms = _project_all(kinds, starts, sizes, alphas, betas, tau, v, w, jacobians, marks, work)
     total = 0.0
     for r in range(m):
         total += w[r] * w[r]
-    total *= 0.5 / tau
+    total = 0.5 * total / tau + terms
     for i in range(n):
         step = y[i] - y0[i] if p[i] < 0.5 else 0.0
         total += y[i] * (0.5 * p[i] * y[i] + q[i]) + 0.5 * rho * step * step
@@ -169,25 +181,34 @@ def _level(p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w,
 
 @njit(folder=_FOLDER)
 def _solve_point(
-    p, G, q, h, kinds, starts, sizes, alphas, y, lam, tolerance, tau, limit,
+    p, G, q, h, kinds, starts, sizes, alphas, betas, y, lam, tolerance, tau, limit,
     y0, trial, v, w, slope, direction, jacobians, marks, matrix, product, work,
 ):  # fmt: skip
     """Solve one program of unit size from (y, λ), in place. Returns (status, residual, Newton steps, τ, ρ of the last matrix)."""
     n, m = p.size, h.size
     steps, stalled = 0, 0
     best = math.inf
-    # λ must lie in K*
+    # λ must lie in K*; multipliers of scalar terms may have any value
     for r in range(m):
         v[r] = lam[r]
-    _project_all(kinds, starts, sizes, alphas, v, lam, jacobians, marks, work)
+    _project_all(kinds, starts, sizes, alphas, betas, tau, v, w, jacobians, marks, work)
+    for b in range(kinds.size):
+        if kinds[b] < POWER_TERM:
+            for r in range(starts[b], starts[b] + sizes[b]):
+                lam[r] = w[r]
     inner = 1e-2
     status, residual = ITERATION_LIMIT, math.inf
     rho = 1e-3
+    # powers and exponentials are flat where they do not act: only a stiff penalty sees them
+    highest = 1e5
+    for b in range(kinds.size):
+        if kinds[b] > SEMIDEFINITE:
+            highest = 1e11
     for _turn in range(60):
         for i in range(n):
             y0[i] = y[i]
         value, size = _level(
-            p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w, jacobians, marks, slope, work
+            p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, betas, v, w, jacobians, marks, slope, work
         )
         for _ in range(limit):
             if size <= inner:
@@ -207,7 +228,26 @@ def _solve_point(
                 for i in range(n):
                     trial[i] = y[i] + factor * direction[i]
                 value, size = _level(
-                    p, q, G, h, trial, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w, jacobians, marks, slope, work
+                    p,
+                    q,
+                    G,
+                    h,
+                    trial,
+                    y0,
+                    lam,
+                    rho,
+                    tau,
+                    kinds,
+                    starts,
+                    sizes,
+                    alphas,
+                    betas,
+                    v,
+                    w,
+                    jacobians,
+                    marks,
+                    slope,
+                    work,
                 )
                 # near the minimum the value is flat to rounding; there the slope decides
                 if value <= before + 1e-4 * factor * along or size <= 0.9 * size_before:
@@ -216,7 +256,26 @@ def _solve_point(
                 factor *= 0.5
             if not taken:
                 value, size = _level(
-                    p, q, G, h, y, y0, lam, rho, tau, kinds, starts, sizes, alphas, v, w, jacobians, marks, slope, work
+                    p,
+                    q,
+                    G,
+                    h,
+                    y,
+                    y0,
+                    lam,
+                    rho,
+                    tau,
+                    kinds,
+                    starts,
+                    sizes,
+                    alphas,
+                    betas,
+                    v,
+                    w,
+                    jacobians,
+                    marks,
+                    slope,
+                    work,
                 )
                 break
             for i in range(n):
@@ -244,7 +303,7 @@ def _solve_point(
         if stalled > 8:
             break
         if residual > 0.05 * best or residual > 1e-3:
-            tau = min(10.0 * tau, 1e5)
+            tau = min(10.0 * tau, highest)
             rho = max(0.1 * rho, 1e-7)
         best = min(best, residual)
         inner = max(min(0.1 * residual, 1e-2), 4.0 * _EPS * (1.0 + scale))
@@ -307,7 +366,7 @@ def _tangent(
 
 @njit(folder=_FOLDER)
 def solve_points(
-    p, G, q0, q1, h0, h1, C, c1, kinds, starts, sizes, alphas, data, warm, y_all, l_all,
+    p, G, q0, q1, h0, h1, C, c1, kinds, starts, sizes, alphas, betas, data, warm, y_all, l_all,
     slopes, tangents, want_tangent, residuals, statuses, counts, tolerance, tau_start, limit,
 ):  # fmt: skip
     """The program at every row d of `data` (N, D).
@@ -321,6 +380,7 @@ def solve_points(
         largest = max(largest, sizes[b] if kinds[b] == SECOND_ORDER else 6)
     jacobians = np.zeros((kinds.size, largest, largest))
     marks = np.zeros(kinds.size, dtype=np.int64)
+    shapes, scales = np.zeros((2, kinds.size))
     y, y0, trial, slope, direction, product, dy, dy0 = np.zeros((8, n))
     lam, v, w, h, dl, a, b_ = np.zeros((7, m))
     q, right = np.zeros((2, n))
@@ -344,6 +404,10 @@ def solve_points(
             continue
         if scale == 0.0:
             scale = 1.0
+        for b in range(kinds.size):
+            shapes[b], scales[b] = alphas[b], betas[b]
+            if kinds[b] >= POWER_TERM:
+                shapes[b], scales[b] = scaled_term(kinds[b], alphas[b], betas[b], scale)
         for i in range(n):
             q[i] /= scale
             y[i] = y_all[point, i] / scale if warm else 0.0
@@ -351,7 +415,7 @@ def solve_points(
             h[r] /= scale
             lam[r] = l_all[point, r] / scale if warm else 0.0
         status, residual, steps, tau, rho = _solve_point(
-            p, G, q, h, kinds, starts, sizes, alphas, y, lam, tolerance, tau_start, limit,
+            p, G, q, h, kinds, starts, sizes, shapes, scales, y, lam, tolerance, tau_start, limit,
             y0, trial, v, w, slope, direction, jacobians, marks, matrix, product, work,
         )  # fmt: skip
         statuses[point], residuals[point], counts[point] = status, residual, steps
@@ -374,7 +438,7 @@ def solve_points(
                 for j in range(n):
                     value += G[r, j] * y[j]
                 v[r] = lam[r] + tau * value
-            _project_all(kinds, starts, sizes, alphas, v, w, jacobians, marks, work)
+            _project_all(kinds, starts, sizes, shapes, scales, tau, v, w, jacobians, marks, work)
             _newton_matrix(p, rho, tau, G, kinds, starts, sizes, v, jacobians, marks, matrix, product)
             _factor(matrix, n)
             _tangent(

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..cache import content_hash
 
-__all__ = ["rooms_hash"]
+__all__ = ["files_hash", "rooms_hash"]
 
 
 @functools.cache
@@ -30,4 +30,19 @@ def rooms_hash() -> str:
                 parts += [file.name, file.read_bytes()]
     for file in ("cache.py",):
         parts.append((root / file).read_bytes())
+    return content_hash(*parts)
+
+
+def files_hash(*names: str) -> str:
+    """Hash of the named files of this room alone, with the same versions: the key of code that no law and no generator changes."""
+    root = Path(__file__).parent
+    parts: list[str | bytes] = [
+        sys.version,
+        platform.machine(),
+        platform.processor(),
+        version("numba"),
+        version("llvmlite"),
+    ]
+    for file in (*(root / name for name in sorted(names)), root.parent / "cache.py"):
+        parts += [file.name, file.read_bytes()]
     return content_hash(*parts)

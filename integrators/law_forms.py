@@ -1,7 +1,4 @@
-"""Canonical forms of a law at given numbers: ψ over (ε, X), φ* over the forces or φ over the rates.
-
-The thermal pair (∇T, −q/T) is not part of the step, whose temperature is given: terms of φ* in ∇T alone are left out.
-"""
+"""Canonical forms of a law at given numbers: ψ over (ε, X), φ* over the forces or φ over the rates."""
 
 from __future__ import annotations
 
@@ -10,18 +7,17 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from sympy import Add, Expr
+from sympy import Expr
 
 from ..errors import DeclarationError, InputError
 from ..potentials import Law
 from ..potentials.conic_form import Frame, conic_expression, split, weighted_term
 from ..potentials.evaluate import evaluate
-from ..potentials.scalars import Temperature
-from ..potentials.vector import VectorSymbol
 from .canonical import CanonicalForm, canonical_form, empty_form
 from .convexity import worst_direction
+from .declared import DeclaredStep, components, packed_layout
 
-__all__ = ["LawForms", "law_forms", "packed_layout", "strain_flows"]
+__all__ = ["LawForms", "law_forms"]
 
 
 @dataclass(frozen=True)
@@ -34,66 +30,31 @@ class LawForms:
     moved: tuple[int, ...]
 
 
-def packed_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
-    """Place (start, length) of each internal variable in a packed state row, and its length."""
-    layout: dict[str, tuple[int, int]] = {}
-    start = 0
-    for variable in law.internal:
-        length = {2: 6, 1: 3}.get(getattr(variable, "rank", 0), 1)
-        layout[variable.name] = (start, length)
-        start += length
-    return layout, start
-
-
-def strain_flows(law: Law) -> bool:
-    """True if the force (or rate) of the observable enters the force function: the step then needs the old strain."""
-    return law.observable in law.forces
-
-
-def law_forms(law: Law, numbers: Mapping[Any, Any]) -> LawForms:
-    """Forms at `numbers`, which map parameters, the temperature and frozen symbols to values.
+def law_forms(step: DeclaredStep, numbers: Mapping[Any, Any]) -> LawForms:
+    """Forms at `numbers`, which map parameters and the coefficients of `step` to values.
 
     Raises `DeclarationError` for a term without conic form and `InputError` for values at which ψ or φ* is not convex or f(0) > 0.
     """
+    law = step.law
     layout, size = packed_layout(law)
     places = {law.observable: 0, **{v: 6 + layout[v.name][0] for v in law.internal}}
-    energy = _canonical(law, "psi", law.energy, (), places, 6 + size, numbers)
-    potential = law.phi if law.phi is not None else law.phi_star
-    if potential is None:
+    energy = _canonical(law, "psi", step.energy, (), places, 6 + size, numbers)
+    if step.finite == 0 and not step.surfaces:
         return LawForms(energy, None, True, ())
-    word = "phi" if law.phi is not None else "phi_star"
     force_places: dict[Any, int] = {}
     moved: list[int] = []
     for variable in (law.observable, *law.internal):
         symbol = law.forces.get(variable)
         if symbol is not None:
             force_places[symbol] = len(moved)
-            start = places[variable]
-            length = {2: 6, 1: 3}.get(getattr(variable, "rank", 0), 1)
-            moved += range(start, start + length)
-    surfaces = tuple(f for f in potential.surfaces if not _thermal(law, word, f))
-    finite = Add(*(t for t in Add.make_args(potential.finite) if not _thermal(law, word, t)))
-    _check_surfaces(law, word, surfaces, force_places, numbers)
-    flow = _canonical(law, word, finite, surfaces, force_places, len(moved), numbers)
+            moved += range(places[variable], places[variable] + components(variable))
+    _check_surfaces(law, step.word, step.surfaces, force_places, numbers)
+    flow = _canonical(law, step.word, step.finite, step.surfaces, force_places, len(moved), numbers)
     return LawForms(energy, flow, law.phi is None, tuple(moved))
 
 
-def _thermal(law: Law, word: str, term: Expr) -> bool:
-    """True for a term in ∇T (or −q/T) alone; one that mixes it with other forces is refused."""
-    thermal = {v for v in term.atoms(VectorSymbol) if v.role in ("force", "rate") and isinstance(v.variable, Temperature)}
-    if not thermal:
-        return False
-    others = {s for s in law.forces.values() if s not in thermal and term.has(s)}
-    if others:
-        raise DeclarationError(
-            f"law '{law.name}': {word} couples {', '.join(map(str, thermal))} with {', '.join(sorted(map(str, others)))} in {term}; "
-            "a step at a point is given no temperature gradient"
-        )
-    return True
-
-
 def _check_surfaces(law: Law, word: str, surfaces: tuple[Expr, ...], places: Mapping[Any, int], numbers: Any) -> None:
-    zero = {s: np.zeros({2: 6, 1: 3}.get(getattr(s, "rank", 0), ())) for s in places}  # type: ignore[call-overload]
+    zero = {s: np.zeros(components(s)) if components(s) > 1 else 0.0 for s in places}
     for f in surfaces:
         value = float(evaluate(f, {**numbers, **zero}))
         if not value <= 0.0:
@@ -129,7 +90,9 @@ def _canonical(
         for weight, term in rest:
             objective = objective + weighted_term(weight, term, frame, z, constraints)
             if marked and not objective.is_convex():
-                raise DeclarationError(f"{where}: the term {weight:g} * ({term}) is not convex by the rules of its atoms")
+                raise DeclarationError(
+                    f"{where}: the term {weight:g} * ({term}) is not convex by the rules of its atoms"
+                )
         for f in surfaces:
             function = conic_expression(frame.substituted(f), frame, z, constraints)
             if marked and not (isinstance(function, float) or function.is_convex()):
@@ -147,5 +110,4 @@ def _canonical(
 
 
 def _part(vector: Any, variable: Any, start: int) -> Any:
-    length = {2: 6, 1: 3}.get(getattr(variable, "rank", 0), 1)
-    return vector[start : start + length]
+    return vector[start : start + components(variable)]

@@ -16,12 +16,14 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .canonical import CanonicalForm, Cone, dual_cones
+from .natural_units import cleaned, natural_units
 
 __all__ = ["FlowForm", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates"]
 
@@ -101,12 +103,20 @@ class StepProgram:
     strain_flows: bool
     unbounded: bool
 
-    def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array]:
-        """(kinds, starts, sizes, exponents)."""
+    def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array, Array]:
+        """(kinds, starts, sizes, first and second number of the cone or scalar term)."""
         kinds = np.array([c.kind for c in self.cones], dtype=np.int64)
         sizes = np.array([c.size for c in self.cones], dtype=np.int64)
         starts = np.concatenate([[0], np.cumsum(sizes)[:-1]]).astype(np.int64) if sizes.size else sizes
-        return kinds, starts, sizes, np.array([c.alpha for c in self.cones], dtype=float)
+        numbers = np.array([(c.alpha, c.beta) for c in self.cones], dtype=float).reshape(-1, 2).T
+        return kinds, starts, sizes, numbers[0].copy(), numbers[1].copy()
+
+    @cached_property
+    def compact(self) -> Any:
+        """The same program with scalar terms in place of cones where that can be, see `compact`."""
+        from .compact import compact
+
+        return compact(self)
 
     def increments(self, data: Array, y: Array) -> Array:
         """X − X_n, shape (n, state_size)."""
@@ -208,51 +218,20 @@ def _reduce(
     rank = int((s > RANK * s.max(initial=0.0)).sum())
     misfit = u[:, rank:].T @ E[:, :k] if E.size else np.zeros((0, k))
     misfit = misfit[np.abs(misfit).max(axis=1, initial=0.0) > 1e-12]
-    N = vt[rank:].T
-    # x = S (1, d) + N y
+    N = cleaned(vt[rank:].T)
+    # x = S (1, d) + x', x' in the span of N
     S = -(vt[:rank].T / s[:rank]) @ (u[:, :rank].T @ E[:, :k]) if rank else np.zeros((n, k))
     S[np.abs(S) < 1e-15 * np.abs(S).max(initial=0.0)] = 0.0
-    whole = np.vstack([np.hstack([np.eye(k), np.zeros((k, N.shape[1]))]), np.hstack([S, N])])
+    whole = np.vstack([np.hstack([np.eye(k), np.zeros((k, n))]), np.hstack([S, np.eye(n)])])
     full = whole.T @ full @ whole
     X = X @ whole
     H = H - G @ S
-    G = G @ N
-    # whiten: P = I on its range
-    P = full[k:, k:]
-    values, vectors = np.linalg.eigh(0.5 * (P + P.T)) if P.size else (np.zeros(0), np.zeros((0, 0)))
-    strong = values > 1e-13 * max(float(values.max(initial=0.0)), 1e-300)
-    T = vectors / np.sqrt(np.where(strong, values, 1.0))
-    G = G @ T
-    blocks = np.zeros(G.shape[0])
-    start = 0
-    for cone in cones:
-        rows = slice(start, start + cone.size)
-        if cone.kind == 0:
-            for r in range(start, start + cone.size):
-                blocks[r] = np.linalg.norm(G[r]) or 1.0
-        else:
-            blocks[rows] = np.linalg.norm(G[rows], 2) or 1.0
-        start += cone.size
-    # directions without curvature: orthonormal images under the scaled constraints
-    unbounded = False
-    p = np.where(strong, 1.0, 0.0)
-    if not strong.all():
-        free = T[:, ~strong]
-        images = (G / blocks[:, None])[:, ~strong]
-        _, s, vt = np.linalg.svd(images, full_matrices=False) if images.size else (0, np.zeros(0), np.zeros((0, 0)))
-        live = s > 1e-9 * max(float(s.max(initial=0.0)), 1e-300)
-        directions = vt[live].T / s[live]
-        T = np.hstack([T[:, strong], T[:, ~strong] @ directions])
-        G = np.hstack([G[:, strong], G[:, ~strong] @ directions])
-        # what neither curves nor meets a constraint must not be pulled at
-        lost = np.eye(images.shape[1]) - vt[live].T @ vt[live] if images.size else np.eye(images.shape[1])
-        pull = lost @ free.T @ full[k:, :k]
-        unbounded = bool(np.abs(pull).max(initial=0.0) > 1e-9 * np.abs(full[k:, :k]).max(initial=0.0))
-        p = np.concatenate([np.ones(int(strong.sum())), np.zeros(directions.shape[1])])
-    G, H = G / blocks[:, None], H / blocks[:, None]
+    units = natural_units(N, full[k:, k:], G, H[:, 0], full[k:, :k], cones)
+    T, blocks = units.columns, units.rows
+    G, H = G @ T / blocks[:, None], H / blocks[:, None]
     linear = T.T @ full[k:, :k]
     return StepProgram(
-        p,
+        units.curvature,
         np.ascontiguousarray(G),
         linear[:, 0].copy(),
         np.ascontiguousarray(linear[:, 1:]),
@@ -269,5 +248,5 @@ def _reduce(
         misfit[:, 1:].copy(),
         m,
         strain_flows,
-        unbounded,
+        units.unbounded,
     )

@@ -224,7 +224,9 @@ def weighted_term(weight: float, term: Expr, frame: Frame, z: Any, constraints: 
     if isinstance(term, Pow) and weight > 0.0 and not frame.moves(term.exp):
         exponent = frame.number(term.exp)
         if exponent > 1.0 and exponent != 2.0:
-            return _node(Pow(Float(weight ** (1.0 / exponent), 17) * term.base, term.exp, evaluate=False), frame, z, constraints)
+            return _node(
+                Pow(Float(weight ** (1.0 / exponent), 17) * term.base, term.exp, evaluate=False), frame, z, constraints
+            )
     return weight * _node(term, frame, z, constraints)
 
 
@@ -324,7 +326,9 @@ def _power(node: Pow, frame: Frame, z: Any, constraints: list[Any]) -> Any:
     length = cvxpy.norm2(square[0] @ z + square[1])
     if exponent == 0.5:
         return length
-    power = Pow(Dummy("r"), Float(2.0 * exponent) if 2.0 * exponent != int(2.0 * exponent) else Integer(round(2.0 * exponent)))
+    power = Pow(
+        Dummy("r"), Float(2.0 * exponent) if 2.0 * exponent != int(2.0 * exponent) else Integer(round(2.0 * exponent))
+    )
     return atom_of(power).conic(power, (length, 2.0 * exponent), constraints)
 
 
@@ -352,6 +356,15 @@ def _gauge(base: Expr, exponent: float, frame: Frame, z: Any, constraints: list[
             parts.append(((weight * frame.number(term)) ** exponent, cvxpy.Constant(1.0)))
         else:
             return None
+    if n == 2.0 and all(part.is_affine() or part.is_nonneg() for _, part in parts):
+        sides = []
+        for weight, part in parts:
+            side = weight * part
+            if not part.is_affine():
+                side = cvxpy.Variable()
+                constraints.append(side >= weight * part)
+            sides.append(side)
+        return cvxpy.norm2(cvxpy.hstack(sides))
     top = cvxpy.Variable()
     shares = []
     for weight, part in parts:
