@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sympy import Expr, Lambda
+from sympy import Expr, Float, Lambda
 
 from ..errors import DeclarationError
 from .atoms import ATOMS, atom_of
@@ -97,14 +97,22 @@ class _Evaluation:
             return sum((self.of(a) for a in thing.args), np.asarray(0.0))
         if thing.is_Mul:
             return self._product(thing)
-        arguments = tuple(a if isinstance(a, Lambda) else self.of(a) for a in thing.args)
+        arguments = tuple(self._bound(a) if isinstance(a, Lambda) else self.of(a) for a in thing.args)
         if type(thing) in ATOMS:
             return atom_of(thing).value(thing, arguments)
-        name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan"}.get(thing.func.__name__, thing.func.__name__)
+        name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "Abs": "abs"}.get(
+            thing.func.__name__, thing.func.__name__
+        )
         function = getattr(np, name, None)
         if not isinstance(thing, Expr) or function is None:
             raise DeclarationError(f"no numbers are known for {thing}")
         return function(*arguments)
+
+    def _bound(self, function: Any) -> Lambda:
+        """A function of an eigenvalue with numbers for its parameters."""
+        free = function.expr.free_symbols - set(function.variables)
+        numbers = {s: Float(float(self._symbol(s)), 17) for s in free}
+        return Lambda(function.variables[0], function.expr.xreplace(numbers))
 
     def _product(self, thing: Any) -> Any:
         found: Any = self.np.asarray(1.0)

@@ -89,5 +89,5 @@ class Atom:
 
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
         """Legendre–Fenchel conjugate of the node as a function of its own (single) argument, at `dual`: (value, domain as
-        expressions ≤ 0); None if no closed form is known."""
+        expressions ≤ 0); of a concave node, that of its negative; None if no closed form is known."""
         return None

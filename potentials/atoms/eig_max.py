@@ -56,6 +56,12 @@ class EigMax(Atom):
         constraints.append(top * np.eye(3) - as_matrix(arguments[0]) >> 0)
         return top
 
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        from .eig_min import eig_min
+        from .trace import tr
+
+        return S.Zero, (-eig_min(dual), tr(dual) - 1, 1 - tr(dual))
+
 
 def checked_tensor(value: object, word: str) -> SymmetricTensor:
     """A tensor without positive parts; refuses the rest in one line."""

@@ -55,6 +55,12 @@ class EigMin(Atom):
         constraints.append(as_matrix(arguments[0]) - low * np.eye(3) >> 0)
         return low
 
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        from .eig_max import eig_max
+        from .trace import tr
+
+        return S.Zero, (eig_max(dual), tr(dual) + 1, -tr(dual) - 1)
+
 
 def eig_min(tensor: SymmetricTensor) -> Expr:
     """Smallest eigenvalue, concave."""

@@ -40,7 +40,7 @@ class EigSumLeaf(Invariant):
 
 
 class EigSum(Atom):
-    """As convex and as smooth as g; gradient and Hessian by g′ and the divided differences of g′."""
+    """As convex and as smooth as g; gradient and Hessian by g′ and the divided differences of g′. (Σ g)* is Σ g* (Lewis 1996)."""
 
     word = "eig_sum"
     node = EigSumLeaf
@@ -76,7 +76,7 @@ class EigSum(Atom):
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         from ..evaluate import evaluate
 
-        function, values = node.args[0], eigenvalues(arguments[1])
+        function, values = arguments[0], eigenvalues(arguments[1])
         return evaluate(function.expr, {function.variables[0]: values}).sum(axis=-1)
 
     def conic(self, node: Any, arguments: tuple[Any, ...], constraints: list[Any]) -> Any:
@@ -96,6 +96,17 @@ class EigSum(Atom):
             frame = Frame({function.variables[0]: i}, 3, {})
             total = total + conic_expression(function.expr, frame, mu, constraints)
         return total
+
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
+        from ..conjugation.form import NoRule
+        from ..conjugation.groups import conjugate_of_eigenvalues
+
+        function = node.args[0]
+        try:
+            found = conjugate_of_eigenvalues(function.expr, function.variables[0], dual)
+        except NoRule:
+            return None
+        return found.value, found.inequalities
 
 
 def eig_sum(function: Any, tensor: SymmetricTensor) -> Expr:

@@ -12,7 +12,7 @@ __all__ = ["Logarithm"]
 
 
 class Logarithm(Atom):
-    """Concave, increasing, on x > 0."""
+    """Concave, increasing, on x > 0; the conjugate of −log x is −1 − log(−y) on y < 0."""
 
     word = "log"
     node = log
@@ -36,3 +36,6 @@ class Logarithm(Atom):
         import cvxpy
 
         return cvxpy.log(arguments[0])
+
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        return -1 - log(-dual), (dual,)

@@ -87,6 +87,10 @@ class MaximumAtom(Atom):
 
         return cvxpy.maximum(*arguments)
 
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
+        """Of |x| as a function of x; max(a, b) has two arguments."""
+        return (S.Zero, (dual - 1, -dual - 1)) if node.args[0] == -node.args[1] else None
+
 
 def rewrite_maximum(expression: Expr) -> Expr:
     """The expression with Max(a, b, …), Min(a, b, …) and Abs(x) written through `Maximum`."""

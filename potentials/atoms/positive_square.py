@@ -79,3 +79,9 @@ class PositiveSquare(Atom):
         rest = cvxpy.Variable(6)
         constraints.append(as_matrix(rest) >> 0)
         return cvxpy.sum_squares(arguments[0] + rest)
+
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        from .eig_min import eig_min
+        from .inner import inner
+
+        return inner(dual, dual) / 4, (-eig_min(dual),)

@@ -66,3 +66,9 @@ class PositiveTrace(Atom):
         upper = cvxpy.Variable((3, 3), PSD=True)
         constraints.append(upper >> as_matrix(arguments[0]))
         return cvxpy.trace(upper)
+
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        from .eig_max import eig_max
+        from .eig_min import eig_min
+
+        return S.Zero, (-eig_min(dual), eig_max(dual) - 1)

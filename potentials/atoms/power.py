@@ -85,11 +85,16 @@ class Power(Atom):
         raise DeclarationError(f"{node} has no conic form")
 
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
-        n = node.exp
-        if n.is_number and not n > 1:
-            return None
-        # (x^n)* = (n-1) (y/n)^(n/(n-1)) on y >= 0, zero below (x restricted to x >= 0)
+        """Of xⁿ as a function on x ≥ 0 (of all x for even n ≥ 2); for 0 < n < 1, of −xⁿ."""
+        from .maximum import Maximum
         from .positive_part import PositivePart
 
-        inside = dual if n.is_even else PositivePart(dual)
+        n = node.exp
+        if n.is_number and 0 < n < 1:
+            return (1 - n) * (-dual / n) ** (n / (n - 1)), (dual,)
+        if n.is_number and n < 0:
+            return (n - 1) * (dual / n) ** (n / (n - 1)), (dual,)
+        if n.is_number and n <= 1:
+            return None
+        inside = dual if n == 2 else Maximum(dual, -dual) if n.is_even else PositivePart(dual)
         return (n - 1) * (inside / n) ** (n / (n - 1)), ()

@@ -52,6 +52,11 @@ class Trace(Atom):
     def conic(self, node: Any, arguments: tuple[Any, ...], constraints: list[Any]) -> Any:
         return arguments[0][0] + arguments[0][1] + arguments[0][2]
 
+    def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
+        from .norm import norm
+
+        return S.Zero, (norm(dual - identity),)
+
 
 def tr(tensor: SymmetricTensor) -> Expr:
     """Trace; of a positive part tr T^≥ = Σ ⟨t_i⟩."""

@@ -20,6 +20,7 @@ from ..evaluate import evaluate
 from ..extended import Extended
 from ..invariants import Invariant
 from ..ranked import Ranked
+from ..tensor import Deviator
 from .form import MinForm, NoRule, Phase
 from .slots import mentions
 from .sums import conjugate_form
@@ -241,7 +242,7 @@ def _size(thing: Any, table: Mapping[Any, Any]) -> Any:
     total: Any = 0.0
     if isinstance(thing, Ranked):
         for atom, c in thing.terms().items():
-            part = evaluate(atom, table)
+            part = evaluate(atom.args[0] if isinstance(atom, Deviator) else atom, table)
             total = total + np.abs(evaluate(c, table)) * np.sqrt((part * part).sum(axis=-1))
         return total
     for term in thing.as_ordered_terms():

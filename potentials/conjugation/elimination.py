@@ -7,9 +7,10 @@ increasingly takes its largest lower bound; b γ + a γ^(−q) has its minimum w
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import reduce
 from typing import Any
 
-from sympy import Add, Expr, Mul, Pow, S, default_sort_key, powsimp
+from sympy import Add, Expr, Mul, Pow, S, default_sort_key, log, powsimp, solve
 
 from ..atoms.eig_min import EigMinLeaf
 from ..atoms.maximum import Maximum
@@ -178,7 +179,7 @@ def _bounded(form: MinForm, unknown: Multiplier) -> MinForm | None:
             return None
     kinds = _growth(form.value, unknown)
     if kinds is None:
-        return None
+        return _stationary(form, unknown, bounds, others)
     rising, falling = kinds
     conditions: tuple[Expr, ...] = ()
     if not falling:
@@ -213,6 +214,26 @@ def _bounded(form: MinForm, unknown: Multiplier) -> MinForm | None:
         inequalities=tuple(substituted(f, table) for f in others),
         unknowns=tuple(u for u in form.unknowns if u != unknown),
         conditions=tuple(dict.fromkeys((*form.conditions, *conditions))),
+    )
+
+
+def _stationary(form: MinForm, unknown: Multiplier, bounds: list[Expr], others: list[Expr]) -> MinForm | None:
+    """A convex objective with the minimum at a known γ₀ takes γ = max(γ₀, bounds)."""
+    part = Add(*(t for t in Add.make_args(form.value.expand()) if mentions(t, {unknown})))
+    if not part.has(log) or any(mentions(f, {unknown}) for f in others):
+        return None
+    try:
+        found = solve(part.diff(unknown), unknown)
+    except NotImplementedError:
+        return None
+    if len(found) != 1 or _has_duals(found[0]) or found[0].has(Multiplier):
+        return None
+    table = {unknown: reduce(Maximum, bounds, found[0])}
+    return replace(
+        form,
+        value=substituted(form.value, table),
+        inequalities=tuple(others),
+        unknowns=tuple(u for u in form.unknowns if u != unknown),
     )
 
 
@@ -265,7 +286,14 @@ def _growth(value: Expr, unknown: Multiplier) -> tuple[list[tuple[Expr, Expr]], 
             rising.append((weight, exponent))
         if weight.is_negative:
             return None
-    return rising, falling
+    return _gathered_powers(rising), _gathered_powers(falling)
+
+
+def _gathered_powers(pairs: list[tuple[Expr, Expr]]) -> list[tuple[Expr, Expr]]:
+    found: dict[Expr, Expr] = {}
+    for weight, power in pairs:
+        found[power] = found.get(power, S.Zero) + weight
+    return [(weight, power) for power, weight in found.items()]
 
 
 def _largest(bounds: list[Expr]) -> Expr:

@@ -23,11 +23,20 @@ from ..atoms.trace import TraceLeaf, tr
 from ..ranked import Ranked
 from ..tensor import PositiveTensor
 from .form import MinForm, NoRule
-from .one_variable import conjugate_of_one_variable
+from .one_variable import conjugate_of_one_variable, positive_view
 from .quadratic import Node, Quadratic, nodes_of, opened, tidy_scalar
 from .slots import Functional, Parts
 
-__all__ = ["EigenGroup", "GaugeGroup", "QuadraticGroup", "ScalarGroup", "UnilateralGroup", "length_of", "root_of"]
+__all__ = [
+    "EigenGroup",
+    "GaugeGroup",
+    "QuadraticGroup",
+    "ScalarGroup",
+    "UnilateralGroup",
+    "conjugate_of_eigenvalues",
+    "length_of",
+    "root_of",
+]
 
 E = Symbol("x", real=True)
 
@@ -66,13 +75,8 @@ def length_of(square: Expr) -> Expr:
 
 def root_of(value: Expr) -> Expr:
     """√ of a non-negative expression, with parameters that are bounded by zero from below taken as positive: √(r²) is r."""
-    from sympy import Dummy
-
-    from ..scalars import Parameter
-
-    table = {p: Dummy(p.name, positive=True) for p in value.free_symbols if isinstance(p, Parameter) and p.lower >= 0}
-    back = {d: p for p, d in table.items()}
-    return sqrt(value.xreplace(table)).xreplace(back)
+    table = positive_view(value)
+    return sqrt(value.xreplace(table)).xreplace({d: p for p, d in table.items()})
 
 
 @dataclass
@@ -104,7 +108,7 @@ class GaugeGroup:
             )
         inside = self.weight**2 - opened(2 * found.half)
         return MinForm(
-            found.linear - sqrt(rest) * sqrt(inside),
+            found.linear - root_of(rest) * sqrt(inside),
             (polar - self.weight,),
             equalities,
             conditions=(rest,),
@@ -204,7 +208,7 @@ class EigenGroup:
         if self.function == 0:
             found = self._extreme(Z)
         elif self.top == 0 and self.low == 0:
-            found = self._separable(Z)
+            found = conjugate_of_eigenvalues(self.function, E, Z)
         else:
             raise NoRule("no conjugate is known for a function of all eigenvalues together with an extreme eigenvalue")
         return MinForm(
@@ -225,36 +229,36 @@ class EigenGroup:
             return MinForm(S.Zero, (eig_max(Z),), (equal,), rules=(rule,))
         return MinForm(S.Zero, (tr(PositiveTensor(Z)) - self.top,), (equal,), rules=(rule,))
 
-    def _separable(self, Z: Any) -> MinForm:
-        one = Symbol("x", real=True)
-        found = conjugate_of_one_variable(self.function, E, one)
-        if found is None:
-            raise NoRule(f"no conjugate is known for {self.function} of an eigenvalue")
-        # inside the domain of G* a positive part of the dual is the dual itself
-        value = found.value
-        bounds = []
-        for f in found.domain:
-            slope = f.diff(one)
-            if slope.is_number and slope != 0:
-                at = f.xreplace({one: S.Zero}) / abs(slope)
-                bounds.append((eig_max(Z) if slope > 0 else -eig_min(Z)) + at)
-            else:
-                raise NoRule(f"the domain {f} <= 0 of an eigenvalue has no closed form")
-        if -one in found.domain:
-            value = value.xreplace({PositivePart(one): one})
-        if one in found.domain:
-            value = value.xreplace({PositivePart(-one): -one})
-        square = tidy_scalar(value / one**2)
-        if not square.has(one):
-            total: Expr = square * inner(Z, Z)
-        else:
-            total = eig_sum(lambda x: value.xreplace({one: x}), Z) if value.has(one) else 3 * value
-        return MinForm(
-            total,
-            tuple(bounds),
-            conditions=tuple(found.conditions),
-            rules=("conjugate of a spectral function: conjugate of the function of an eigenvalue", found.rule),
-        )
+
+def conjugate_of_eigenvalues(function: Expr, symbol: Any, Z: Any) -> MinForm:
+    """(Σ g(t_i))* = Σ g*(z_i) for an expression g of a symbol; its domain by the extreme eigenvalues of Z (Lewis 1996)."""
+    one = Symbol("x", real=True)
+    found = conjugate_of_one_variable(function, symbol, one)
+    if found is None:
+        raise NoRule(f"no conjugate is known for {function} of an eigenvalue")
+    value, bounds = found.value, []
+    for f in found.domain:
+        slope = f.diff(one)
+        if slope.has(one) or slope == 0:
+            raise NoRule(f"the domain {f} <= 0 of an eigenvalue has no closed form")
+        down = slope.could_extract_minus_sign()
+        bounds.append((-eig_min(Z) if down else eig_max(Z)) + f.xreplace({one: S.Zero}) / (-slope if down else slope))
+    # inside the domain a positive part of the dual is the dual itself
+    if -one in found.domain:
+        value = value.xreplace({PositivePart(one): one})
+    if one in found.domain:
+        value = value.xreplace({PositivePart(-one): -one})
+    square = tidy_scalar(value / one**2)
+    if not square.has(one):
+        total: Expr = square * inner(Z, Z)
+    else:
+        total = eig_sum(lambda x: value.xreplace({one: x}), Z) if value.has(one) else 3 * value
+    return MinForm(
+        total,
+        tuple(bounds),
+        conditions=tuple(found.conditions),
+        rules=("conjugate of a spectral function: conjugate of the function of an eigenvalue", found.rule),
+    )
 
 
 @dataclass

@@ -42,8 +42,8 @@ def partial_conjugate(thing: Any, *variables: Any, names: str | None = None, pot
     with ∂F*/∂α = −∂F/∂α. Source: Rockafellar 1970, §12 and §33.
 
     >>> from fenchel.potentials import inner, sym_tensor
-    >>> e, x = sym_tensor("e"), sym_tensor("x")
-    >>> print(partial_conjugate(inner(e - x, e - x) / 2, e, names="s").words()[0])
+    >>> eps, x = sym_tensor("eps"), sym_tensor("x")
+    >>> print(partial_conjugate(inner(eps - x, eps - x) / 2, eps, names="s").words()[0])
     inner(s, s)/2 + inner(s, x)
     """
     if not isinstance(thing, Law):

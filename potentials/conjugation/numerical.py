@@ -19,6 +19,9 @@ from ..derivative import partial
 from ..evaluate import evaluate
 from ..extended import Extended, as_extended
 from ..ranked import Ranked
+from ..scalars import ScalarVariable
+from ..tensor import TensorSymbol
+from ..vector import VectorSymbol
 
 if TYPE_CHECKING:
     from .conjugate import Conjugate
@@ -72,7 +75,7 @@ def numerical_conjugate(
         raise InputError("numerical_conjugate: the duals must be finite")
     numbers = {s: np.asarray(v, dtype=float) for s, v in (values or {}).items()}
     problem = _Supremum(potential, slots, dual, numbers)
-    found = problem.solve()
+    found = problem.solve(tolerance)
     scale = problem.size_of_value(found)
     if not found.gap <= tolerance * scale and not (np.isinf(found.value) and found.gap == 0.0):
         raise ConvergenceError(
@@ -97,6 +100,13 @@ def _packed(slot: Any, value: Any) -> Any:
     return found
 
 
+def _plain(slot: Any, place: int) -> Any:
+    name = f"slot_{place}"
+    if not isinstance(slot, Ranked):
+        return ScalarVariable(name)
+    return TensorSymbol(name) if slot.rank == 2 else VectorSymbol(name)
+
+
 @dataclass
 class _Supremum:
     function: Extended
@@ -105,29 +115,38 @@ class _Supremum:
     numbers: dict[Any, Any]
 
     def __post_init__(self) -> None:
+        # plain symbols in place of forces and rates, which hold their variable as an argument (∇T holds T, which is data)
+        self.plain = {slot: _plain(slot, k) for k, slot in enumerate(self.slots)}
+        self.function = self.function.map(lambda e: e.xreplace(self.plain))
         self.places: dict[Any, int] = {}
         start = 0
         for slot in self.slots:
-            self.places[slot] = start
+            self.places[self.plain[slot]] = start
             start += _length(slot)
         self.size = start
 
-    def solve(self) -> NumericalConjugate:
+    def solve(self, tolerance: float) -> NumericalConjugate:
         import numpy as np
 
         try:
-            first = self._conic(1.0, 1.0)
+            best = self._conic(1.0, 1.0)
         except DeclarationError as reason:
             return self._smooth(reason)
-        if np.isinf(first.value) or not np.isfinite(first.gap):
-            return first
-        # once more in the units of what was found
-        length = max(float(np.abs(np.concatenate([np.atleast_1d(v) for v in first.argument.values()])).max()), 1e-300)
-        unit = max(abs(first.value), float(np.abs(self.dual).max()) * length, 1e-300)
-        if not (np.isfinite(length) and np.isfinite(unit)):
-            return first
-        second = self._conic(length, unit)
-        return second if second.gap <= first.gap else first
+        # again in the units of what was found, and in units beside them, until the gap is small enough
+        for stretch, factor in ((1.0, 1.0), (1.0, 10.0), (10.0, 1.0), (0.1, 0.1)):
+            if np.isinf(best.value) or not np.isfinite(best.gap):
+                break
+            length = max(
+                float(np.abs(np.concatenate([np.atleast_1d(v) for v in best.argument.values()])).max()), 1e-300
+            )
+            unit = max(abs(best.value), float(np.abs(self.dual).max()) * length, 1e-300)
+            if not (np.isfinite(length) and np.isfinite(unit)):
+                break
+            found = self._conic(stretch * length, factor * unit)
+            best = found if found.gap < best.gap else best
+            if best.gap <= 0.1 * tolerance * self.size_of_value(best):
+                break
+        return best
 
     def size_of_value(self, found: NumericalConjugate) -> float:
         """Size of the terms whose difference the value is."""
@@ -166,7 +185,7 @@ class _Supremum:
             if np.abs(slope).max() > 0.0:
                 return NumericalConjugate(np.inf, {}, 0.0)
         data, chain, _ = problem.get_problem_data(cvxpy.CLARABEL)
-        options = {"tol_gap_abs": 1e-11, "tol_gap_rel": 1e-11, "tol_feas": 1e-11, "max_iter": 200}
+        options = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
         raw = chain.solve_via_data(problem, data, solver_opts=options)
         status = str(raw.status)
         if "DualInfeasible" in status:
@@ -218,11 +237,12 @@ class _Supremum:
         return any(not float(evaluate(f, table)) <= 0.0 for f in self.function.surfaces)
 
     def _table(self, x: Any) -> dict[Any, Any]:
-        return {**self.numbers, **self._unpacked(x)}
+        return {**self.numbers, **{self.plain[slot]: value for slot, value in self._unpacked(x).items()}}
 
     def _unpacked(self, x: Any) -> dict[Any, Any]:
         found = {}
-        for slot, start in self.places.items():
+        for slot in self.slots:
+            start = self.places[self.plain[slot]]
             part = x[start : start + _length(slot)]
             found[slot] = part if isinstance(slot, Ranked) else part[0]
         return found
@@ -239,7 +259,7 @@ class _Supremum:
 
         if self.function.surfaces:
             raise DeclarationError(f"no certified conjugate: {reason}") from None
-        slopes = {slot: partial(self.function.finite, slot) for slot in self.slots}
+        slopes = {slot: partial(self.function.finite, self.plain[slot]) for slot in self.slots}
 
         def slope(x: Any) -> Any:
             table = self._table(x)

@@ -11,15 +11,17 @@ per side.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
-from sympy import Add, Expr, Mul, Pow, S, Symbol, exp, log, powsimp, simplify
+from sympy import Add, Dummy, Expr, Mul, Pow, S, Symbol, exp, log, powsimp, simplify
 
 from ..atoms import ATOMS
 from ..atoms.maximum import Maximum
 from ..atoms.positive_part import PositivePart
+from ..scalars import Parameter
 from .quadratic import tidy_scalar
 
-__all__ = ["ScalarConjugate", "conjugate_of_one_variable"]
+__all__ = ["ScalarConjugate", "conjugate_of_one_variable", "positive_view"]
 
 
 @dataclass
@@ -81,6 +83,19 @@ def _of_increasing(slope: Expr, rest: list[Expr], s: Symbol, y: Expr, constant: 
     return found
 
 
+def positive_view(expression: Expr) -> dict[Any, Any]:
+    """Positive stand-ins for the parameters that are bounded by zero from below."""
+    return {
+        p: Dummy(p.name, positive=True) for p in expression.free_symbols if isinstance(p, Parameter) and p.lower >= 0
+    }
+
+
+def _plain(inequality: Expr) -> Expr:
+    """c f ≤ 0 with c > 0 as f ≤ 0."""
+    table = positive_view(inequality)
+    return Mul(*(f for f in Mul.make_args(inequality) if not f.xreplace(table).is_positive))
+
+
 def _affine(expression: Expr, s: Symbol) -> tuple[Expr, Expr] | None:
     """(a, b) of a s + b."""
     a = expression.diff(s) if not expression.has(PositivePart, Maximum) else None
@@ -114,7 +129,10 @@ def _of_single(term: Expr, s: Symbol, y: Expr) -> ScalarConjugate | None:
         return None
     value, domain = found
     return ScalarConjugate(
-        weight * value - y * b / a, domain, [weight], f"conjugate of {record.word}, scaling, translation"
+        weight * value - y * b / a,
+        tuple(_plain(f) for f in domain),
+        [weight],
+        f"conjugate of {record.word}, scaling, translation",
     )
 
 

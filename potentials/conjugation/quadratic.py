@@ -81,7 +81,7 @@ def _is_odd(term: Expr) -> bool:
     for node in term.atoms(Function, Pow):
         if isinstance(node, Pow) and node.exp.is_Integer and node.exp > 0:
             continue
-        if node.atoms(Invariant, ScalarVariable):
+        if any(getattr(a, "role", "") != "multiplier" for a in node.atoms(Invariant, ScalarVariable)):
             return True
     return False
 
@@ -90,7 +90,7 @@ def _polynomial(expression: Expr) -> Expr:
     generators = sorted(
         (
             *expression.atoms(Invariant),
-            *(s for s in expression.atoms(Symbol) if isinstance(s, ScalarVariable)),
+            *(s for s in expression.atoms(Symbol) if isinstance(s, ScalarVariable) and s.role != "multiplier"),
         ),
         key=default_sort_key,
     )
@@ -245,7 +245,7 @@ class Quadratic:
             return self.entry(("num", slot), ONE)
         if slot.rank == 1:
             terms = {b[1]: self.entry(a, b) for a, b in self._data_pairs(("vec", slot))}
-            return slot.linear([(x, c) for x, c in terms.items()])
+            return slot.linear(terms.items())
         from ..tensor import identity
 
         total: Any = identity * self.entry(("tr", slot), ONE)
@@ -285,7 +285,7 @@ class Quadratic:
         chosen: list[Node] = []
         for node in slots:
             trial = [*chosen, node]
-            minor = tidy_scalar(Matrix(len(trial), len(trial), lambda i, j: self.entry(trial[i], trial[j])).det())
+            minor = tidy_scalar(Matrix([[self.entry(a, b) for b in trial] for a in trial]).det())
             if minor != 0:
                 chosen.append(node)
                 found.conditions.append(minor)

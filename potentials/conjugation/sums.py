@@ -25,6 +25,7 @@ from .elimination import eliminated
 from .form import MinForm, Phase, is_zero
 from .groups import E, EigenGroup, GaugeGroup, QuadraticGroup, ScalarGroup, UnilateralGroup
 from .quadratic import Node, Quadratic, nodes_of, tidy_scalar
+from .slots import Multiplier
 from .sorting import Sorter
 
 __all__ = ["conjugate_form"]
@@ -61,7 +62,8 @@ class _Sum:
         touched: set[Node] = set()
         for nodes, quadratic, groups in components:
             touched |= nodes
-            self.form = self.form + self._component(quadratic, groups)
+            part = self._component(quadratic, groups)  # may add a multiplier to the form
+            self.form = self.form + part
         self.form = replace(self.form, value=self.form.value + self._constant() - self.data)
         if len(components) > 1:
             self.form = self.form.with_rule("sum of functions of different coordinates")
@@ -260,12 +262,12 @@ class _Sum:
         free = [n for n in nodes_of(slot) if n not in touched]
         if not free:
             return
-        if len(free) == len(nodes_of(slot)):
-            residual = dual
-        else:
-            residual = tr(dual) if free[0][0] == "tr" else dev(dual)
-        if not is_zero(residual):
-            self.form = self.form + MinForm(equalities=(residual,))
+        residuals = [dual]
+        if len(free) < len(nodes_of(slot)):
+            residuals = [tr(dual) if free[0][0] == "tr" else dev(dual)]
+        elif isinstance(dual, Ranked) and dual.rank == 2 and dual.atoms(Multiplier):
+            residuals = [tr(dual), dev(dual)]  # the trace may determine the multiplier
+        self.form = self.form + MinForm(equalities=tuple(r for r in residuals if not is_zero(r)))
 
 
 def _proportion(a: Quadratic, b: Quadratic) -> Expr | None:
@@ -278,8 +280,6 @@ def _proportion(a: Quadratic, b: Quadratic) -> Expr | None:
 
 
 def _new_multiplier(form: MinForm) -> Any:
-    from .slots import Multiplier
-
     count = sum(isinstance(u, Multiplier) for u in form.unknowns)
     return Multiplier("gamma" if count == 0 else f"gamma_{count + 1}")
 

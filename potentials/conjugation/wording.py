@@ -96,7 +96,7 @@ def paired(dual: Any, slot: Any) -> Words:
 
 
 def conditions_of(conditions: Iterable[Expr]) -> tuple[Expr, ...]:
-    """Expressions in parameters that have to be positive, without numerical factors and without repetition; what always holds is left out."""
+    """Expressions in parameters that have to be positive, without numerical factors, repetition and what always holds."""
     found: list[Expr] = []
     for condition in conditions:
         top, bottom = condition.together().as_numer_denom()
