@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..planes import box_planes
 
 if TYPE_CHECKING:
     from ..bodies import Assembly
@@ -48,6 +49,7 @@ class Network:
     friction: Array  # (m,) Coulomb coefficient [-], nan where it is not known
     wall: Ints  # (w, 2) body and plane; planes 2 axis and 2 axis + 1 are those of the box
     wall_force: Array  # (w,) normal force > 0 [N]
+    wall_normal: Array  # (w, d) into the sample; nan for planes that only the simulation knows
     link: Ints  # (l, 2), along the wires
     tension: Array  # (l,) [N], 0 where slack; a rod may have negative ones
     time: float  # [s]
@@ -76,6 +78,11 @@ class Network:
         beads = (a.wire >= 0)[pair].any(axis=1)
         held = a.wall_impulse.reshape(len(a.walls), -1)[:, -1] if len(a.walls) else np.zeros(0)
         touching = np.flatnonzero(held > 0.0) if step > 0.0 else np.zeros(0, dtype=np.int64)
+        wall = a.walls[touching].astype(np.int64).reshape(-1, 2)
+        boxed = 2 * d if a.boxed else 0
+        wall_normal = np.full((len(wall), d), np.nan)
+        of_box = wall[:, 1] < boxed
+        wall_normal[of_box] = box_planes(d)[0][wall[of_box, 1]]
         order = np.lexsort((a.rank[a.links[:, 0]], a.wire[a.links[:, 0]]))
         return cls(
             x=x,
@@ -90,8 +97,9 @@ class Network:
             normal_force=pressure[closed] / step if len(pair) else np.zeros(0),
             tangential_force=tangential,
             friction=np.where(beads, friction if bead_friction is None else bead_friction, friction),
-            wall=a.walls[touching].astype(np.int64).reshape(-1, 2),
+            wall=wall,
             wall_force=held[touching] / step if len(touching) else np.zeros(0),
+            wall_normal=wall_normal,
             link=a.links[order].astype(np.int64),
             tension=a.link_impulse[order] / step if step > 0.0 else np.zeros(len(a.links)),
             time=float(a.time),
@@ -111,7 +119,11 @@ class Network:
         of_candidate = np.full(len(simulation.assembly.pairs), np.nan)
         of_candidate[rows.candidate] = rows.friction
         friction = of_candidate[simulation.assembly.pair_impulse[:, -1] > 0.0]
-        return replace(network, friction=friction)
+        boxed = 2 * network.dimension if simulation.assembly.boxed else 0
+        normal = network.wall_normal.copy()
+        for k in np.flatnonzero(network.wall[:, 1] >= boxed):
+            normal[k] = simulation.planes[network.wall[k, 1] - boxed].direction
+        return replace(network, friction=friction, wall_normal=normal)
 
     @property
     def dimension(self) -> int:

@@ -66,6 +66,7 @@ def touching(x: np.ndarray, radius: float | np.ndarray, **other) -> Network:
         "friction": np.full(len(pair), 0.5),
         "wall": np.zeros((0, 2), dtype=int),
         "wall_force": np.zeros(0),
+        "wall_normal": np.zeros((0, d)),
         "tension": np.zeros(len(link)),
     }
     return Network(
@@ -143,9 +144,8 @@ def test_the_network_is_what_the_step_solved(loaded) -> None:
     whole = np.einsum("ki,kj->ij", force, network.x[network.pair[:, 1]] - network.x[network.pair[:, 0]])
     vector = network.link_vector
     whole += np.einsum("k,ki,kj->ij", network.tension / network.link_length, vector, vector)
-    for (body, plane), push in zip(network.wall, network.wall_force, strict=True):
-        axis, side = plane // 2, 2 * (plane % 2) - 1
-        whole[axis, axis] -= side * push * (side * network.half[axis] - network.x[body, axis])
+    for body, push, normal in zip(network.wall[:, 0], network.wall_force, network.wall_normal, strict=True):
+        whole += push * np.outer(normal, -normal * (normal @ network.x[body] + network.half @ np.abs(normal)))
     expected = moments(simulation.assembly, rows, 1.0)[:, 8].sum(axis=0)
     assert np.linalg.norm(whole - expected) < 1e-9 * np.linalg.norm(expected)
 
@@ -274,7 +274,7 @@ def test_rattlers_are_what_the_largest_core_leaves() -> None:
         pair = every[rng.random(len(every)) < 0.45]
         wall = np.stack([rng.integers(0, n, 3), rng.integers(0, 6, 3)], axis=1)
         base = touching(rng.random((n, 3)), 1e-9)
-        network = replace(base, pair=pair, wall=wall, wall_force=np.ones(3), normal_force=np.ones(len(pair)))
+        network = replace(base, pair=pair, wall=wall, normal_force=np.ones(len(pair)))
         core: set[int] = set()
         for size in range(1, n + 1):
             for group in map(set, combinations(range(n), size)):
