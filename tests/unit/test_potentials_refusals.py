@@ -5,6 +5,7 @@ Each case is a declaration and words that must stand in its message.
 
 import re
 
+import numpy as np
 import pytest
 from sympy import (
     DiracDelta,
@@ -371,3 +372,45 @@ def test_a_value_outside_its_bounds_is_refused_by_name(change, words):
 def test_a_missing_value_is_asked_for():
     values = {name: value for name, value in ENTRIES["sand"].values.items() if name != "C_0"}
     refused(lambda: LAWS["sand"].values(values), "'C_0' has no value; give C_0=", InputError)
+
+
+GIVEN = dict(E=1.0, nu=0.2)
+SOFT = parameter("S", lower=0)
+REFUTED = [
+    # a non-convex set with the two points that show it, and the point half way
+    (
+        lambda: law(phi_star=indicator(C - norm(dev(A)))),
+        dict(C=1.0),
+        "not convex.*f\\(A_eps_p = .* and f\\(A_eps_p = .*half way",
+    ),
+    (lambda: law(phi_star=indicator(tr(A) - tr(A) ** 2 / C)), dict(C=1.0), "not convex.* and .*half way"),
+    (lambda: law(phi_star=sqrt(norm(A))), {}, "phi_star is not convex.* and .*half way"),
+    (lambda: law(phi_star=inner(A, A) - C * norm(A)), dict(C=1.0), "phi_star"),
+    # zero outside, negative at zero
+    (lambda: law(phi_star=indicator(norm(dev(A)) + C)), dict(C=1.0), "f\\(0\\) > 0: f\\(A_eps_p = 0\\) = 1"),
+    (lambda: law(phi_star=YIELD), dict(C=1.0), "phi_star is not zero at zero"),
+    # softening, and energies that are not convex
+    (
+        lambda: law(psi=ELASTIC - SOFT * p**2, phi_star=indicator(YIELD + R), internal=(eps_p, p)),
+        dict(C=1.0, S=1.0),
+        "psi is not convex: .*p = .* and .*p = .*half way",
+    ),
+    (lambda: law(psi=ELASTIC - 100 * tr(eps) ** 2), dict(C=1.0), "psi is not convex: .*eps = .* and .*half way"),
+    (lambda: law(psi=ELASTIC + T**2), dict(C=1.0), "psi is not concave: .*T = .* and .*T = .*half way"),
+]
+
+
+@pytest.mark.parametrize(("declare", "more", "words"), REFUTED)
+def test_an_inadmissible_law_is_refuted_by_numbers_that_show_it(declare, more, words):
+    report = declare().check(**GIVEN, **more)
+    assert report.admissible is False
+    shown = str(report.counterexample)
+    assert re.search(words, shown), shown
+    assert "\n" not in shown
+
+
+@pytest.mark.parametrize(("declare", "more", "words"), REFUTED)
+def test_an_inadmissible_law_is_not_compiled(declare, more, words):
+    """Before any code is written, or, where it depends on the values, before the first step."""
+    with pytest.raises(DeclarationError):
+        declare().compile()(np.zeros((1, 6)), None, **GIVEN, **more)
