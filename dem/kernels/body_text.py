@@ -17,7 +17,8 @@ def prepare(velocity, spin, inverse_mass, turning, gravity, step, before, free):
         before[i, $s + ^] = spin[i, ^]  #? spin
         before[i, $w] = w
         before[i, $r] = turning[i]  #? mixed
-        free[i, :] = before[i, :]
+        for c in range(before.shape[1]):  # a copy of slices would compile ten times as long
+            free[i, c] = before[i, c]
         if w > 0.0:
             free[i, @] += step * gravity[@]
 

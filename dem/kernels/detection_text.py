@@ -12,18 +12,36 @@ def find(x, radius, fixed, wire, rank, apart, skin, offsets, out):
     low = np.empty($dimension)
     cells = np.empty($dimension, dtype=np.int64)
     span = np.empty($dimension)
-    size = 2.0 * radius.max() + skin
+    # plain loops throughout: the reductions and sorts of the library compile for seconds
+    largest = 0.0
+    for i in range(count):
+        largest = max(largest, radius[i])
+    size = 2.0 * largest + skin
+    total = 1
     for a in range($dimension):
-        low[a] = x[:, a].min()
+        low[a] = x[0, a]
+        high = x[0, a]
+        for i in range(count):
+            low[a] = min(low[a], x[i, a])
+            high = max(high, x[i, a])
         # no more cells along one axis than bodies: a lone far body must not exhaust the memory
-        cells[a] = int(min((x[:, a].max() - low[a]) / size, float(count))) + 1
-        span[a] = max(size, (x[:, a].max() - low[a]) / cells[a] * (1.0 + 1e-12))
-    while np.prod(cells) > 8 * count + 64:
-        a = int(np.argmax(cells))
-        cells[a] = (cells[a] + 1) // 2
-        span[a] = max(span[a] * 2.0, size)
-    head = np.full(np.prod(cells), -1, dtype=np.int64)
-    following = np.full(count, -1, dtype=np.int64)
+        cells[a] = int(min((high - low[a]) / size, float(count))) + 1
+        span[a] = max(size, (high - low[a]) / cells[a] * (1.0 + 1e-12))
+        total *= cells[a]
+    while total > 8 * count + 64:
+        most = 0
+        for a in range($dimension):
+            if cells[a] > cells[most]:
+                most = a
+        cells[most] = (cells[most] + 1) // 2
+        span[most] = max(span[most] * 2.0, size)
+        total = 1
+        for a in range($dimension):
+            total *= cells[a]
+    head = np.empty(total, dtype=np.int64)
+    for c in range(total):
+        head[c] = -1
+    following = np.empty(count, dtype=np.int64)
     place = np.empty((count, $dimension), dtype=np.int64)
     for i in range(count - 1, -1, -1):
         c = 0
@@ -57,7 +75,13 @@ def find(x, radius, fixed, wire, rank, apart, skin, offsets, out):
                             near[near_count] = j
                             near_count += 1
                 j = following[j]
-        near[:near_count].sort()
+        for k in range(1, near_count):
+            j = near[k]
+            o = k - 1
+            while o >= 0 and near[o] > j:
+                near[o + 1] = near[o]
+                o -= 1
+            near[o + 1] = j
         for k in range(near_count):
             if found < out.shape[0]:
                 out[found, 0] = i

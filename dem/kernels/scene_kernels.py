@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from functools import cached_property
-from types import ModuleType
+from functools import cache, cached_property
+from types import CodeType, ModuleType
 from typing import Any, Literal
+
+import numpy as np
 
 from ...errors import DeclarationError
 from ..laws.rule import CONTACT_NAMES, LINK_NAMES, ContactLaw, ContactRule, WireLaw, names_in
@@ -22,6 +24,8 @@ from .text import expand
 
 __all__ = ["Columns", "Kernel", "SceneKernels", "detection"]
 
+_PLACE = {"np": np, "max": max, "min": min, "abs": abs, "__builtins__": {}}
+
 Spin = Literal["none", "all", "some"]
 
 
@@ -36,7 +40,7 @@ class Columns:
         """Number of columns."""
         return sum(width for _, width in self.widths)
 
-    @property
+    @cached_property
     def starts(self) -> dict[str, int]:
         """First column of each name."""
         at, out = 0, {}
@@ -58,15 +62,24 @@ class Kernel:
     scalars: tuple[tuple[str, str], ...] = ()  # (argument, expression)
     needs: tuple[str, ...] = ()
 
-    @property
+    @cached_property
     def name(self) -> str:
         """Of the generated module: the kind and the hash of its text."""
         return name_of(self.kind, self.text)
 
-    @property
+    @cached_property
     def module(self) -> ModuleType:
         """Imported, written to disk first where it is new."""
         return load(self.kind, self.text)
+
+    @cached_property
+    def expressions(self) -> dict[str, CodeType]:
+        """The numbers of the law, compiled; a law class states them, `names_in` checks them, nothing of a file is ever evaluated."""
+        return {name: compile(text, f"<{self.kind}.{name}>", "eval") for name, text in self.scalars}
+
+    def numbers(self, values: Mapping[str, float]) -> dict[str, float]:
+        """The numbers of the law for the values of its parameters and of the step, by name of the argument."""
+        return {name: float(eval(code, _PLACE, dict(values))) for name, code in self.expressions.items()}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -313,15 +326,7 @@ class SceneKernels:
         return "\n\n".join(f"# {kernel.name}\n{kernel.text}" for kernel in self.all())
 
 
-def numbers(kernel: Kernel, values: Mapping[str, float]) -> dict[str, float]:
-    """The numbers of a law that a kernel takes as arguments, by name."""
-    import numpy as np
-
-    place = {"np": np, "max": max, "min": min, "abs": abs, "__builtins__": {}}
-    # the expressions are those of a law class, checked by `names_in`; nothing of a file is ever evaluated
-    return {name: float(eval(text, place, dict(values))) for name, text in kernel.scalars}
-
-
+@cache
 def detection(dimension: int) -> Kernel:
     """The kernel of detection in 2 or 3 dimensions."""
     components = ", ".join(f"c_{a}" for a in range(dimension))

@@ -93,9 +93,8 @@ def step_text(
     ]
     lines += ["", "", "@njit", f"def assess({', '.join(signatures['assess'])}):"]
     lines.append(
-        '    """Rebuild the velocities from the impulses alone, then measure rows and bodies; `vel` is overwritten."""'
+        '    """Rebuild the velocities from the impulses, `vel` and `motion` being those without, then measure all."""'
     )
-    lines.append("    vel[:, :] = free")
     for kind in kinds:
         lines.append(f"    apply_{kind}({', '.join(WARMED[kind])})")
     for kind in kinds:
