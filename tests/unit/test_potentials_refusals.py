@@ -412,5 +412,10 @@ def test_an_inadmissible_law_is_refuted_by_numbers_that_show_it(declare, more, w
 @pytest.mark.parametrize(("declare", "more", "words"), REFUTED)
 def test_an_inadmissible_law_is_not_compiled(declare, more, words):
     """Before any code is written, or, where it depends on the values, before the first step."""
-    with pytest.raises(DeclarationError):
-        declare().compile()(np.zeros((1, 6)), None, **GIVEN, **more)
+    bad = declare()
+    heat = {} if bad.temperature is None else {bad.temperature.name: 300.0}
+    refused(
+        lambda: bad.compile()(np.full((1, 6), 1e-3), None, **GIVEN, **more, **heat),
+        "not admissible|not be convex|non-convex|negative|zero force|not be concave|softening|no conic form",
+        InputError,
+    )
