@@ -66,7 +66,7 @@ class ConicUpdate:
         eps = strain_array(eps_new)
         n = eps.shape[0]
         old = self.packing.pack(state, n)
-        numbers = self.law.values(values)
+        numbers = self.law.admissible_values(values)
         energy, flow = energy_atoms(self.law, numbers), flow_atoms(self.law, numbers)
         stress, new, dissipation = np.empty((n, 6)), old.copy(), np.zeros(n)
         tangent = np.empty((n, 6, 6)) if self.tangent else None

@@ -95,7 +95,7 @@ def drive_arrays(
     if not np.isfinite(start).all():
         raise InputError("drive: initial_strain must be six finite Mandel components")
     if isinstance(update, ConicUpdate):
-        return _run_conic(update, plan, update.law.values(values), start, initial_state, times)
+        return _run_conic(update, plan, update.law.admissible_values(values), start, initial_state, times)
     return _run(update, plan, packed_values(update, values), start, initial_state, tolerance, times)
 
 

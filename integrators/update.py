@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
-from .closed import LIMIT, NORM, state_layout
-from .convexity import worst_direction
+from .closed import state_layout
 from .module_store import load_module
 from .structure import NoConeStructure
 
@@ -147,54 +146,8 @@ def strain_array(eps: Any) -> Array:
 
 
 def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
-    """Parameter values as an array in the order of `law.parameters`, checked against bounds and against softening."""
-    values = np.array(list(update.law.values(given).values()), dtype=float)
-    check_moduli(update.law, update.module.moduli_, values)
-    check_couplings(update.law, update.module.couplings_, values)
-    return values
-
-
-def check_moduli(law: Law, moduli: Any, values: Array) -> None:
-    """Refuse values that make ψ non-convex or infinite, by the moduli that the law's derivation lists."""
-    try:
-        with np.errstate(all="ignore"):
-            entries = moduli(values)
-    except (ZeroDivisionError, OverflowError, ValueError):
-        entries = ((law.name, " ".join(p.name for p in law.parameters), np.nan),)
-    table = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
-    for variable, names, value in entries:
-        if np.isfinite(value) and value >= 0.0:
-            continue
-        involved = names.split()
-        shown = ", ".join(f"{n} = {table[n]:g}" for n in involved)
-        if not np.isfinite(value):
-            raise InputError(
-                f"law '{law.name}': {shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2"
-            )
-        if variable in (NORM, LIMIT):
-            rule = "f would not be convex" if variable == NORM else "zero force would lie outside the elastic domain"
-            raise InputError(f"law '{law.name}': {shown} make the {variable} in phi_star {value:g}, negative; {rule}")
-        negative = [n for n in involved if table[n] < 0] or involved
-        if variable != law.observable.name:
-            raise InputError(
-                f"law '{law.name}': {', '.join(f'{n} = {table[n]:g}' for n in negative)} gives '{variable}' a negative modulus; "
-                "psi would not be convex: softening is not modelled"
-            )
-        raise InputError(f"law '{law.name}': {shown} give a negative stiffness; psi would not be convex")
-
-
-def check_couplings(law: Law, couplings: Any, values: Array) -> None:
-    """Refuse values that make ψ non-convex in several variables together, though it is convex in each."""
-    table = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
-    for variables, names, matrix in couplings(values):
-        worst = worst_direction(np.array(matrix, dtype=float))
-        if worst is None:
-            continue
-        involved = [n for n, part in zip(variables.split(), worst[1], strict=True) if abs(part) > 1e-6]
-        shown = ", ".join(f"{n} = {table[n]:g}" for n in names.split())
-        raise InputError(
-            f"law '{law.name}': {shown} make psi non-convex in {', '.join(involved)} together; softening is not modelled"
-        )
+    """Parameter values as an array in the order of `law.parameters`, checked against bounds and the conditions of admissibility."""
+    return np.array(list(update.law.admissible_values(given).values()), dtype=float)
 
 
 def raise_failures(status: NDArray[np.int64], eps: Array) -> None:

@@ -39,6 +39,7 @@ class Law:
     [W/m³], an expression, an `indicator(...)` or a sum, or None (elastic); one observable strain; internal variables of any rank.
 
     `irreversible` names the internal tensors whose sum is ε^ir (reversible split; inferred where ψ holds ε − x). `density` ρ [kg/m³].
+    `insist`: conditions of admissibility are not enforced, see `compile`.
     Raises `DeclarationError` where the declaration breaks a rule; see `check` for admissibility.
     """
 
@@ -52,6 +53,7 @@ class Law:
     psi_star: Any = None
     irreversible: tuple[TensorSymbol, ...] | None = None
     density: Any = None
+    insist: bool = field(default=False, repr=False)
 
     def __post_init__(self) -> None:
         for key, value in normalise(self).items():
@@ -198,6 +200,15 @@ class Law:
             found[name] = number
         return found
 
+    def admissible_values(self, given: Mapping[str, Any]) -> dict[str, float]:
+        """`values`, which also keep the conditions that admissibility puts on the parameters; `InputError` names the first broken one."""
+        found = self.values(given)
+        if not self.insist:
+            from .admissibility import enforce
+
+            enforce(self, found)
+        return found
+
     def with_parameters(self, *, name: str | None = None, **expressions: Any) -> Law:
         """The same law with parameters replaced by expressions in other parameters, all at once."""
         known = {p.name: p for p in self.parameters}
@@ -226,16 +237,32 @@ class Law:
         return build_table(self, formulation, split)
 
     def check(self, **values: Any) -> Any:
-        """Admissibility by composition rules: `.admissible` True, False or None, `.conditions`, `.reasons`."""
+        """Is ψ convex and φ* convex, non-negative and zero at zero? An `AdmissibilityReport`: `.admissible` True (proved), False (refuted)
+        or None (undecided), `.conditions`, `.reasons`, `.counterexample`; for all parameters, or for the `values` given."""
         from .admissibility import check
 
         return check(self, values)
 
     def compile(
-        self, dimension: str = "3d", *, formulation: str = "strain", solver: str = "auto", tangent: bool = True
+        self,
+        dimension: str = "3d",
+        *,
+        formulation: str = "strain",
+        solver: str = "auto",
+        tangent: bool = True,
+        insist: bool = False,
     ) -> Any:
-        """The implicit step as an `Update`; see `fenchel.integrators.build_update`."""
-        return _integrators().build_update(self, dimension, formulation=formulation, solver=solver, tangent=tangent)
+        """The implicit step as an `Update`; see `fenchel.integrators.build_update`.
+
+        A law that `check` refutes is refused with the counter-example; `insist=True` compiles it all the same and enforces no condition
+        on its parameters but their bounds.
+        """
+        if not insist:
+            from .admissibility import refuse
+
+            refuse(self)
+        law = replace(self, insist=True) if insist else self
+        return _integrators().build_update(law, dimension, formulation=formulation, solver=solver, tangent=tangent)
 
     def source(self, dimension: str = "3d") -> str:
         """Text of the generated module."""

@@ -13,7 +13,7 @@ from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import EVERYWHERE, interval, natural_range, sharp_interval
 
-__all__ = ["Condition", "Need", "as_conditions", "holds", "softens"]
+__all__ = ["Condition", "Need", "as_conditions", "holds", "only_at_zero_of", "softens"]
 
 ROUNDING = 1e-10
 
@@ -46,8 +46,9 @@ class Condition(str):
 
     def __new__(cls, need: Need, potential: str) -> Condition:
         low, _ = sharp_interval(need.expression)
-        relation = ">" if need.strict else ">="
-        self = str.__new__(cls, f"{_shown(need.expression)} {relation} 0")
+        base = only_at_zero_of(need.expression)
+        relation = "=" if base is not None else (">" if need.strict else ">=")
+        self = str.__new__(cls, f"{_shown(need.expression if base is None else base)} {relation} 0")
         self.expression, self.strict, self.about, self.potential = (need.expression, need.strict, need.about, potential)
         self.implied = low > 0.0 or (low == 0.0 and not need.strict)
         free = need.expression.free_symbols | need.expression.atoms(ScalarVariable)
@@ -69,6 +70,16 @@ class Condition(str):
         if not all(map(math.isfinite, (*parts, *(high - low for low, high in ends)))):
             return math.nan, 1.0
         return math.fsum(parts), max(map(abs, parts))
+
+
+def only_at_zero_of(expression: Any) -> Expr | None:
+    """b if the expression is −c b², c > 0, which is not negative at b = 0 only, where b may be of either sign."""
+    weight, body = expression.as_coeff_Mul()
+    base, exponent = body.as_base_exp()
+    if not (weight.is_negative and exponent == 2):
+        return None
+    low, high = sharp_interval(base)
+    return base if low < 0.0 < high else None
 
 
 def holds(condition: Condition, values: Mapping[Any, float]) -> bool | None:

@@ -25,7 +25,7 @@ from ..atoms import ATOMS, atom_of
 from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import interval, natural_range, sharp_interval
-from .conditions import Need
+from .conditions import Need, only_at_zero_of
 from .powers import convex_power, convex_quotient
 from .quadratic import degree_of, quadratic_form
 from .single import convex_by_second_derivative
@@ -253,6 +253,9 @@ class Prover:
         proof = Proof()
         for minor, names in minors:
             part = self.data_nonnegative(minor, "modulus", names)
+            if part is None and only_at_zero_of(minor) is not None and minor.free_symbols <= minor.atoms(Parameter):
+                # a coupling that no stiffness carries must vanish
+                part = Proof((Need(minor, "modulus", names),))
             if part is None:
                 return None
             proof = proof + part
