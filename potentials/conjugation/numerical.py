@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 __all__ = ["NumericalConjugate", "conjugate_arguments", "conjugate_values", "numerical_conjugate"]
 
 REACH = 10.0
+AT_REST = 1e-2
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def numerical_conjugate(
     numbers = {s: np.asarray(v, dtype=float) for s, v in (values or {}).items()}
     problem = _Supremum(potential, slots, dual, numbers)
     found = problem.solve(tolerance)
-    scale = problem.size_of_value(found)
+    scale = max(problem.size_of_value(found), problem.size_at_rest())
     if not found.gap <= tolerance * scale and not (np.isinf(found.value) and found.gap == 0.0):
         raise ConvergenceError(
             f"numerical_conjugate: the gap {found.gap:.3g} exceeds {tolerance:g} of the size {scale:.3g} of the value; "
@@ -137,13 +138,14 @@ class _Supremum:
             if np.isinf(best.value) or not np.isfinite(best.gap):
                 break
             length = max(
-                float(np.abs(np.concatenate([np.atleast_1d(v) for v in best.argument.values()])).max()), 1e-300
+                float(np.abs(np.concatenate([np.atleast_1d(v) for v in best.argument.values()])).max()), AT_REST**6
             )
             unit = max(abs(best.value), float(np.abs(self.dual).max()) * length, 1e-300)
             if not (np.isfinite(length) and np.isfinite(unit)):
                 break
             found = self._conic(stretch * length, factor * unit)
-            best = found if found.gap < best.gap else best
+            # a ray in units that small is rounding: the value was found finite and bounded
+            best = found if np.isfinite(found.value) and found.gap < best.gap else best
             if best.gap <= 0.1 * tolerance * self.size_of_value(best):
                 break
         return best
@@ -156,6 +158,12 @@ class _Supremum:
             return 1.0
         x = np.concatenate([np.atleast_1d(v) for v in found.argument.values()])
         return max(abs(found.value), float(np.abs(self.dual) @ np.abs(x)), 1e-300)
+
+    def size_at_rest(self) -> float:
+        """Size that stands for that of the value where the supremum is attained at zero, so that its terms have none."""
+        import numpy as np
+
+        return AT_REST * (float(np.abs(self.dual).max()) or 1.0)
 
     # -- conic -----------------------------------------------------------------------------------------------------------------
 
