@@ -5,6 +5,7 @@ Tensor algebra on sympy, parameters with units and bounds, forces and indicators
 """
 
 from ..errors import DeclarationError
+from .conjugation import numerical_conjugate, partial_conjugate, total_conjugate
 from .extended import Extended, indicator
 from .invariants import eig_max, eig_min, eig_sum, inner, norm, pos, tr
 from .law import Law
@@ -35,13 +36,16 @@ __all__ = [
     "lame",
     "load_law",
     "norm",
+    "numerical_conjugate",
     "parameter",
     "parameters",
+    "partial_conjugate",
     "pos",
     "rates",
     "scalar",
     "sym_tensor",
     "temperature",
+    "total_conjugate",
     "tr",
     "unilateral_conjugate",
     "unilateral_energy",

@@ -64,7 +64,7 @@ class MinForm:
     def map(self, change: Callable[[Any], Any]) -> MinForm:
         """The same with every expression changed; equalities 0 = 0 and inequalities that numbers decide fall away."""
         equalities = tuple(e for e in (change(e) for e in self.equalities) if not is_zero(e))
-        inequalities = tuple(f.primitive()[1] for f in (change(f) for f in self.inequalities) if not f.is_nonpositive)
+        inequalities = tuple(f for f in (change(f) for f in self.inequalities) if not f.is_nonpositive)
         return replace(
             self,
             value=change(self.value),

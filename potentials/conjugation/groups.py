@@ -280,17 +280,18 @@ class UnilateralGroup:
         trace, square = opened(tr(Z)), inner(Z, Z)
         y = -Maximum(-eig_min(Z), -lam * trace / (2 * mu + 3 * lam))
         value = y**2 / (2 * lam) + (square - 2 * y * trace + 3 * y**2) / (4 * mu)
+        shift = opened(self.eigen.shifted(Z))
         return MinForm(
-            value + opened(self.eigen.shifted(Z)),
+            value + shift,
             (-eig_min(Z),),
             tuple(equalities),
             conditions=(mu, lam),
             rules=("conjugate of the unilateral energy, three cases",),
-            cases=_cases(Z, lam, mu),
+            cases=_cases(Z, lam, mu, shift),
         )
 
 
-def _cases(Z: Any, lam: Expr, mu: Expr) -> tuple[tuple[str, str], ...]:
+def _cases(Z: Any, lam: Expr, mu: Expr, shift: Expr) -> tuple[tuple[str, str], ...]:
     from sympy import latex, sstr
 
     z, l, m = sstr(Z), sstr(lam), sstr(mu)
@@ -301,7 +302,7 @@ def _cases(Z: Any, lam: Expr, mu: Expr) -> tuple[tuple[str, str], ...]:
     hooke_tex = (
         rf"\frac{{{zt}:{zt}}}{{4 {mt}}} - \frac{{{lt} \left(\mathrm{{tr}}\,{zt}\right)^2}}{{4 {mt} (2 {mt} + 3 {lt})}}"
     )
-    return (
+    found = (
         (
             f"{hooke} if the {least} >= {limit} (all strains >= 0)",
             rf"{hooke_tex} \quad\text{{if }} {least_tex} \geq {limit_tex}",
@@ -317,3 +318,6 @@ def _cases(Z: Any, lam: Expr, mu: Expr) -> tuple[tuple[str, str], ...]:
             rf"\text{{ wherever }} {least_tex} \geq 0",
         ),
     )
+    if shift == 0:
+        return found
+    return tuple((f"{sstr(shift)} + {a}", f"{latex(shift)} + {b}") for a, b in found)

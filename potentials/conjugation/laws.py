@@ -24,6 +24,7 @@ from .conjugate import Conjugate, conjugate
 
 __all__ = [
     "dissipation_pair",
+    "dual_of",
     "energy_from_conjugate",
     "force_potential_from_rates",
     "partial_conjugate",
@@ -82,8 +83,7 @@ def total_conjugate(thing: Any, *variables: Any, names: str | None = None, poten
     declared = thing.phi if thing.phi is not None else thing.phi_star
     if declared is None:
         raise DeclarationError(f"law '{thing.name}' has no force function; it is elastic")
-    slots = slots_of(thing)
-    return conjugate(declared, {s: _dual_of(s) for s in slots})
+    return conjugate(declared, {s: dual_of(s, thing) for s in slots_of(thing)})
 
 
 def _checked(potential: str) -> str:
@@ -104,7 +104,7 @@ def slots_of(law: Law) -> tuple[Any, ...]:
 
 def _rate_slots(law: Law) -> dict[Any, Any]:
     """Rate of each slot and the force that is its dual."""
-    return {s if s.role == "rate" else _dual_of(s): _dual_of(s) if s.role == "rate" else s for s in slots_of(law)}
+    return {s if s.role == "rate" else dual_of(s): dual_of(s, law) if s.role == "rate" else s for s in slots_of(law)}
 
 
 def dissipation_pair(law: Law) -> tuple[Extended, Extended]:
@@ -113,9 +113,11 @@ def dissipation_pair(law: Law) -> tuple[Extended, Extended]:
     return (law.phi, other) if law.phi is not None else (other, law.phi_star)
 
 
-def _dual_of(slot: Any) -> Any:
-    """The symbol that a slot of φ or φ* is paired with."""
+def dual_of(slot: Any, law: Law | None = None) -> Any:
+    """The symbol that a slot of φ or φ* is paired with; the force of the observable of a law is called sig_ir."""
     variable = slot.variable
+    if law is not None and variable == law.observable and slot.role == "rate":
+        return forces(variable, names="sig_ir")
     if isinstance(variable, Temperature):
         return entropy_flux(variable) if slot.role == "force" else gradient(variable)
     return rates(variable) if slot.role == "force" else forces(variable)
@@ -130,7 +132,7 @@ def _duals(variables: Iterable[Any], names: str | None) -> dict[Any, Any]:
     for variable, word in zip(order, words, strict=True):
         paired = isinstance(variable, (ForceTensor, ForceVector, ForceScalar, RateTensor, RateVector, RateScalar))
         if word is None and paired:
-            found[variable] = _dual_of(variable)
+            found[variable] = dual_of(variable)
             continue
         if not paired and not is_variable(variable) and not isinstance(variable, (Ranked, Symbol)):
             raise DeclarationError(f"a conjugate is taken in variables, forces or rates, not in {variable}")

@@ -38,7 +38,7 @@ from ..atoms.atom import Invariant
 from ..atoms.inner import InnerLeaf, inner
 from ..atoms.trace import TraceLeaf, tr
 from ..ranked import Ranked
-from ..scalars import ScalarVariable
+from ..scalars import ScalarVariable, Temperature
 from ..tensor import Deviator, IdentityTensor, dev, from_terms
 from .slots import Functional
 
@@ -81,16 +81,21 @@ def _is_odd(term: Expr) -> bool:
     for node in term.atoms(Function, Pow):
         if isinstance(node, Pow) and node.exp.is_Integer and node.exp > 0:
             continue
-        if any(getattr(a, "role", "") != "multiplier" for a in node.atoms(Invariant, ScalarVariable)):
+        if any(isinstance(a, Invariant) or not _is_coefficient(a) for a in node.atoms(Invariant, ScalarVariable)):
             return True
     return False
+
+
+def _is_coefficient(symbol: Any) -> bool:
+    """Multipliers and the temperature count as parameters."""
+    return symbol.role == "multiplier" or isinstance(symbol, Temperature)
 
 
 def _polynomial(expression: Expr) -> Expr:
     generators = sorted(
         (
             *expression.atoms(Invariant),
-            *(s for s in expression.atoms(Symbol) if isinstance(s, ScalarVariable) and s.role != "multiplier"),
+            *(s for s in expression.atoms(Symbol) if isinstance(s, ScalarVariable) and not _is_coefficient(s)),
         ),
         key=default_sort_key,
     )

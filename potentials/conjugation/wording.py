@@ -51,10 +51,12 @@ def comparison(residual: Any, sign: str) -> Words:
         sides: list[Any] = [make(left), make(right)]
     else:
         terms = Add.make_args(residual.expand() if _short(residual) else residual)
-        sides = [
-            Add(*(t for t in terms if not t.could_extract_minus_sign())),
-            -Add(*(t for t in terms if t.could_extract_minus_sign())),
-        ]
+        left = [t for t in terms if not t.could_extract_minus_sign()]
+        right = [-t for t in terms if t.could_extract_minus_sign()]
+        alone = left if len(left) == 1 else right if not left and len(right) == 1 else []
+        # a side of one term is written without its number
+        number = Mul(*(f for t in alone for f in Mul.make_args(t) if f.is_number))
+        sides = [Add(*(t / number for t in left)), Add(*(t / number for t in right))]
     (a, at), (b, bt) = shown(sides[0]), shown(sides[1])
     if sign == "=" and a == "0":
         a, at, b, bt = b, bt, a, at

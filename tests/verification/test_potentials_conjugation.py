@@ -5,8 +5,7 @@ import pytest
 
 from fenchel.errors import InputError
 from fenchel.potentials import unilateral_conjugate, unilateral_energy
-from fenchel.potentials.conjugate import partial_conjugate
-from fenchel.potentials.library import reinforced_sand, texsol, wire
+from fenchel.potentials.library import wire
 
 I6 = np.array([1.0, 1, 1, 0, 0, 0])
 
@@ -91,33 +90,6 @@ def test_agrees_with_a_semidefinite_program():
         problem = cp.Problem(cp.Maximize(work - energy), [cp.trace(minus) <= 20 * np.trace(matrix(stress)) / mu])
         problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-9, tol_gap_rel=1e-9, tol_feas=1e-9)
         assert unilateral_conjugate(stress, lam, mu) == pytest.approx(problem.value, rel=1e-6, abs=1e-7)
-
-
-@pytest.mark.parametrize("law", [texsol, reinforced_sand], ids=lambda law: law.name)
-def test_the_phases_of_the_stress_table_add_up_to_the_work(law):
-    rng = np.random.default_rng(4)
-    values = dict(E_s=12e6, nu_s=0.2, lambda_w=1e6, mu_w=2e6)
-    strains, plastic = 1e-3 * rng.normal(size=(50, 6)), 1e-3 * rng.normal(size=(50, 6))
-    lam, mu = 12e6 * 0.2 / 1.2 / 0.6, 12e6 / 2.4
-    elastic = strains - plastic
-    sand = lam * elastic[:, :3].sum(axis=1)[:, None] * I6 + 2 * mu * elastic
-    if law is texsol:
-        wires = wire.compile()(strains, None, lambda_w=1e6, mu_w=2e6).stress
-    else:
-        wires = 1e6 * strains[:, :3].sum(axis=1)[:, None] * I6 + 4e6 * strains
-    ground, network = partial_conjugate(law).phases
-    assert str(ground.shift) == "eps_p"
-    psi = law.compile().energy(
-        strains,
-        {"eps_p": plastic, "alpha": np.zeros((50, 6)), "p": np.zeros(50)},
-        **values,
-        H_k=0,
-        H_i=0,
-        theta_f=0.1,
-        C_0=1e3,
-    )
-    conjugate = ground.value(sand, **values) + (sand * plastic).sum(axis=1) + network.value(wires, **values)
-    assert conjugate + psi == pytest.approx(((sand + wires) * strains).sum(axis=1), rel=1e-10)
 
 
 @pytest.mark.parametrize(
