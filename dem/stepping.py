@@ -351,6 +351,21 @@ class Simulation:
         c |= {"tolerance": tolerance, "floor": self._floor / c["step"], "sweep_limit": sweep_limit}
         return self._step.solve(*(c[name] for name in self._signatures["solve"]))
 
+    def fastest(self, drive: Drive, step: float) -> float:
+        """Largest speed of a body at the end of a step without contacts [m/s]."""
+        gravity = np.asarray(drive.gravity, dtype=float)[: self.assembly.dimension]
+        return float(np.sqrt(np.max(np.sum((self.assembly.velocity + step * gravity) ** 2, axis=1), initial=0.0)))
+
+    def change_step(self, step: float) -> None:
+        """Let the next step have another length [s]: mid configurations move so that the configurations q stay (see `adaptive`)."""
+        a = self.assembly
+        if a.step and a.step != step:
+            more = (step - a.step) * (1.0 - self.theta)
+            a.x += more * a.velocity
+            if self._box:
+                a.half = a.half + more * a.box_velocity
+            a.plane_place = a.plane_place + more * a.plane_velocity
+
     def _walls_energy(self, c: dict[str, Any], out: Array) -> None:
         """Kinetic energy, work and damping of box and planes that have inertia."""
         theta = self.theta

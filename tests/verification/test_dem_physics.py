@@ -7,7 +7,7 @@ import re
 import numpy as np
 import pytest
 
-from fenchel.dem import Assembly, Drive, Laws, Plane, Simulation, Solver
+from fenchel.dem import AdaptiveStep, Assembly, Drive, Laws, Plane, Simulation, Solver, relax
 from fenchel.dem.laws import (
     CompliantSignoriniCoulomb,
     ContactLaw,
@@ -17,7 +17,7 @@ from fenchel.dem.laws import (
     Signorini,
     SignoriniCoulomb,
 )
-from fenchel.errors import InputError
+from fenchel.errors import ConvergenceError, InputError
 
 G = 9.81
 FLOOR = Plane(normal=(0, 0, 1), point=(0, 0, 0))
@@ -241,7 +241,7 @@ def test_energy_never_rises_with_inelastic_contacts(step: float, theta: float) -
     last = energy(0.5 * float(a.mass @ np.sum(a.velocity**2, axis=1)))
     scale = last
     touched = 0.0
-    for _ in range(400 if step == 1e-4 else 40):
+    for _ in range({1e-4: 400, 1e-1: 12}.get(step, 40)):
         measures = simulation.advance(step, down())
         now = energy(measures["kinetic"])
         assert now <= last + 1e-9 * scale
@@ -392,3 +392,57 @@ def test_bad_planes_are_one_line() -> None:
         Simulation(ball(1.0), Laws(), Solver(), planes=[Plane(normal=(0, 1), point=(0, 0))])
     with pytest.raises(InputError, match="theta"):
         Simulation(ball(1.0), Laws(), Solver(), theta=0.4)
+
+
+def test_the_step_adapts_to_flight_and_to_sweeps_and_grows_again() -> None:
+    """A ball thrown fast is followed in short steps, one that rests in long ones; q keeps its place when the step changes."""
+    a = ball(0.5, velocity=(0.0, 0.0, -2.0))
+    # a longer step moves the mid configuration of a landing ball into the floor: a little recovery brings it back
+    simulation = Simulation(a, Laws(contact=SignoriniCoulomb(friction=0.4, recovery=0.2)), TIGHT, planes=[FLOOR])
+    pace = AdaptiveStep(simulation=simulation, most=1e-2, least=1e-6, travel=0.5)
+    lengths = []
+    while a.time < 1.0 - 1e-12:
+        before, velocity, step = a.x[0, 2], a.velocity[0, 2], a.step
+        pace.advance(down(), until=1.0)
+        lengths.append(a.step)
+        if a.velocity[0, 2] != 0.0 and step:
+            # q = q_m − h v/2 at the start of the step, exact flight in between
+            q = before - 0.5 * step * velocity
+            after = a.x[0, 2] - 0.5 * a.step * a.velocity[0, 2]
+            if after > 0.011:
+                assert after - q == pytest.approx(0.5 * a.step * (velocity + a.velocity[0, 2]), rel=1e-9, abs=1e-15)
+                assert a.velocity[0, 2] == pytest.approx(velocity - G * a.step, rel=1e-12)
+    assert a.time == pytest.approx(1.0, abs=1e-12)
+    assert min(lengths) < 2.5e-3 and max(lengths[-20:-1]) == 1e-2 and pace.cuts > 0
+    assert a.x[0, 2] == pytest.approx(0.01, abs=1e-7)
+    strict = Simulation(
+        pile(), Laws(contact=SignoriniCoulomb(friction=0.4)), Solver(tolerance=1e-10, sweep_limit=30), planes=[FLOOR]
+    )
+    with pytest.raises(ConvergenceError):
+        stubborn = AdaptiveStep(simulation=strict, most=1e-2, least=5e-3, travel=10.0)
+        for _ in range(50):
+            stubborn.advance(down())
+    with pytest.raises(InputError, match="least"):
+        AdaptiveStep(simulation=strict, most=1e-3, least=1e-2)
+
+
+def pile() -> Assembly:
+    """Thirty spheres in a loose column."""
+    x = np.stack([1e-3 * (np.arange(30) % 2), np.zeros(30), 0.0101 + 0.0201 * np.arange(30)], axis=1)
+    return Assembly.of_spheres(x, np.full(30, 0.01), np.full(30, 0.01))
+
+
+def test_relaxation_finds_the_equilibrium_of_a_compliant_pile() -> None:
+    """Column of six spheres: deflection of contact k is the weight above over k_n, found without waiting for the oscillations to die."""
+    count, k = 6, 1e4
+    x = np.stack([np.zeros(count), np.zeros(count), 0.01 + 0.02 * np.arange(count)], axis=1)
+    a = Assembly.of_spheres(x, np.full(count, 0.01), np.full(count, 0.05))
+    law = CompliantSignoriniCoulomb(friction=0.4, k_n=k, k_t=k)
+    simulation = Simulation(a, Laws(contact=law), Solver(tolerance=1e-13, sweep_limit=100_000), planes=[FLOOR])
+    out = relax(simulation, down(), 1e-2, tolerance=1e-9)
+    assert out.unbalanced < 1e-9 and out.steps < 100
+    weight = 0.05 * G * np.arange(count, 0, -1)
+    gaps = np.diff(np.concatenate([[-0.01], a.x[:, 2]])) - 0.02
+    np.testing.assert_allclose(gaps, -weight / k, rtol=1e-8)
+    with pytest.raises(ConvergenceError, match="relaxation"):
+        relax(Simulation(ball(1.0), Laws(contact=law), TIGHT, planes=[FLOOR]), down(), 1e-3, step_limit=5)
