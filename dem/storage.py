@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from .. import __version__
+from ..cache import source_hash
 from ..errors import InputError, StorageError
 
 __all__ = ["UNITS", "load_run", "replace_file", "save_run"]
@@ -26,11 +27,16 @@ FORMAT = 3
 UNITS = {
     "pressure": "Pa", "axial_strain": "1", "wall_strain": "1", "wall_stress": "Pa", "box_stress": "Pa", "octant_volume": "m3",
     "grain_moment": "J", "bead_moment": "J", "link_moment": "J", "x": "m", "radius": "m", "mass": "kg", "velocity": "m/s",
-    "spin": "m/s", "half": "m", "box_velocity": "m/s", "box_mass": "kg", "link_length": "m", "link_impulse": "N s",
-    "pair_impulse": "N s", "wall_impulse": "N s", "listed_x": "m", "listed_half": "m", "step": "s", "elastic_energy": "J",
-    "time": "s", "elastic": "J", "friction": "J", "algorithmic": "J", "shock": "J", "external": "J", "kinetic": "J", "balance": "J",
-    "strain_sand": "1", "strain_wire": "1", "stress_grains": "Pa", "stress_beads": "Pa", "stress_links": "Pa",
-    "force_mean": "N", "overlap_mean": "m", "overlap_max": "m", "violation_max": "m",
+    "spin": "m/s", "half": "m", "box_velocity": "m/s", "box_mass": "kg", "plane_place": "m", "plane_velocity": "m/s",
+    "link_length": "m", "link_impulse": "N s", "pair_impulse": "N s", "wall_impulse": "N s", "listed_x": "m", "listed_place": "m",
+    "listed_reach": "m", "step": "s", "elastic_energy": "J", "time": "s", "elastic": "J", "friction": "J", "algorithmic": "J",
+    "shock": "J", "external": "J", "kinetic": "J", "balance": "J", "wires": "J", "damping": "J", "weight": "J", "drive": "J",
+    "strain_sand": "1", "strain_wire": "1", "stress_grains": "Pa", "stress_beads": "Pa", "stress_links": "Pa", "force_mean": "N",
+    "overlap_mean": "m", "overlap_max": "m", "violation_max": "m", "natural_map": "1", "natural_map_max": "1", "unbalanced": "1",
+    "sliding": "1", "closed": "1", "sweeps": "1", "change": "1", "inertial_number": "1", "speed": "1", "sphere": "m",
+    "start_half": "m", "start_x": "m", "wire_density": "m-2",
+    # count, Σx, Σu, Σx⊗x, Σu⊗x one after the other
+    "grain_fit": "1, m, m2", "bead_fit": "1, m, m2",
 }  # fmt: skip
 
 
@@ -82,8 +88,20 @@ def _take(group: Any) -> dict[str, Any]:
     return out
 
 
+def _versions() -> dict[str, str]:
+    """Versions of what computes."""
+    import llvmlite
+    import numba
+    import scipy
+
+    return {module.__name__: module.__version__ for module in (np, numba, llvmlite, scipy)}
+
+
 def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]) -> None:
-    """Write a nested dictionary of arrays, numbers and strings as one HDF5 file, with the settings and versions that made it."""
+    """Write a nested dictionary of arrays, numbers and strings as one HDF5 file, with the settings, versions and units that made it.
+
+    No date and no name of a machine: equal runs give equal files.
+    """
     import h5py
 
     image = io.BytesIO()
@@ -94,6 +112,10 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
         file.attrs["conventions"] = (
             "SI units; tension positive; components xx, yy, zz, yz, xz, xy, shear not doubled; frame first"
         )
+        file.attrs["units"] = json.dumps(UNITS, sort_keys=True)  # also of numbers that are attributes; not listed: 1
+        file.attrs["versions"] = json.dumps(_versions(), sort_keys=True)
+        file.attrs["machine"] = f"{platform.system()} {platform.machine()}"
+        file.attrs["source"] = source_hash("dem")
         file.attrs["settings"] = json.dumps(settings, sort_keys=True)
         for key, value in content.items():
             _put(file, key, value)
@@ -129,6 +151,6 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
             )
         content = _take(file)
     settings = json.loads(content.pop("settings"))
-    for name in ("format", "program", "python", "conventions"):
-        content.pop(name)
+    for name in ("format", "program", "python", "conventions", "units", "versions", "machine", "source"):
+        content.pop(name, None)
     return content, settings
