@@ -99,6 +99,8 @@ class Simulation:
             threads=threads,
         )
         self._partition = Partition(threads) if threads > 1 else None
+        if threads > 1:
+            _start_threads(threads)
         self._prepare()
 
     def _prepare(self) -> None:
@@ -403,6 +405,13 @@ class Simulation:
             )
         if self._links is not None:
             a.link_impulse = rows.tension.copy()
+
+
+def _start_threads(threads: int) -> None:
+    """Start numba's threads, of which a step read from the disk cache knows nothing (it would fall into the void without them)."""
+    import numba
+
+    numba.set_num_threads(min(threads, numba.config.NUMBA_NUM_THREADS))  # type: ignore[attr-defined]
 
 
 def _spin(a: Assembly) -> Literal["none", "all", "some"]:
