@@ -8,12 +8,16 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from law_states import derivative, moving, number, random_states, temperatures
+from law_states import derivative, environment, moving, number, random_states, temperatures
 from law_truth import DEV, I6, ROOT2, TRUTHS, matrix, sand_f, stiffness, turned, wire_stress
-from scipy.optimize import root
+from scipy.optimize import brentq, root
 
+from fenchel.potentials import dev, frozen, inner, norm, parameter, pos, rates, scalar, sym_tensor, tr
+from fenchel.potentials.conjugation import numerical_conjugate, partial_conjugate, total_conjugate
 from fenchel.potentials.derivative import partial
+from fenchel.potentials.evaluate import evaluate
 from fenchel.potentials.library import ENTRIES, LAWS
+from fenchel.potentials.scalars import ScalarVariable
 
 written = [name for name in LAWS if name in TRUTHS]  # laws that are written a second time
 
@@ -118,6 +122,95 @@ def test_claim_05_primal_and_dual_state_laws_are_equivalent(name):
         other = x["eps"][(i + 7) % 40]
         above = float(number(law.energy, law, v, {**here, "eps": other})) + conjugate - sigma[i] @ other
         assert above >= -1e-10 * (scale[i] + abs(sigma[i] @ other))
+
+
+@pytest.mark.parametrize("name", written)
+def test_claim_05_conjugates_by_rule_and_by_number_are_the_written_ones(name):
+    """ψ* by rule (or as the minimum the rules give) and the certified supremum, against ψ* written by hand; then σ = ∂ψ, ε ∈ ∂ψ*."""
+    law, v, truth = truth_of(name)
+    rng = np.random.default_rng(51)
+    x = random_states(ENTRIES[name], rng, 3)
+    if truth.moduli(SimpleNamespace(**v))[1] == 0:  # wires alone: cases (i) and (ii), and a stress outside the domain
+        x["eps"] = turned(rng, np.array([[1.0, 2.0, 3.0], [2.0, 1.0, -0.1], [1.0, 1.0, 1.0]])) * 1e-3
+    sigma = number(law.stress, law, v, x)
+    rule = partial_conjugate(law)
+    (dual,) = rule.duals.values()
+    table = environment(law, v, x)
+    del table[law.observable]
+    values = rule.value(table | {dual: sigma})
+    scale = np.abs((sigma * x["eps"]).sum(1)) + np.abs(truth.energy(v, x))
+    tight = 1e-10 if rule.closed else 1e-7
+    for i in range(3):
+        here = {key: value[i] for key, value in x.items()}
+        exact = truth.conjugate(
+            v, sigma[i] + (1e-13 * np.abs(sigma[i]).max() * I6 if rule.closed and rule.domain else 0), here
+        )
+        assert values[i] == pytest.approx(exact, abs=tight * scale[i])
+        # Fenchel equality with the declared energy
+        psi = float(number(law.energy, law, v, here))
+        assert psi + values[i] == pytest.approx(sigma[i] @ here["eps"], abs=tight * scale[i])
+    data = {symbol: np.asarray(value)[0] if np.ndim(value) else value for symbol, value in table.items()}
+    certified = numerical_conjugate(law.energy, law.observable, {law.observable: sigma[0]}, data)
+    assert certified.gap >= 0 and certified.gap <= 1e-5 * (1 + abs(certified.value))
+    assert certified.value - 1e-7 * scale[0] <= values[0] <= certified.value + certified.gap + 1e-7 * scale[0]
+    if truth.moduli(SimpleNamespace(**v))[1] == 0:
+        outside = sigma[0] - 2 * np.abs(sigma[0]).max() * I6
+        assert rule.value(table | {dual: outside[None]})[0] == np.inf
+
+
+def singular_values_of(s):
+    return np.linalg.eigvalsh(matrix(s))
+
+
+E_, C_ = parameter("G", lower=0), parameter("c", lower=0)
+e = sym_tensor("e_0")
+KINKED = {
+    "norm": (C_ * norm(e), lambda s, G, c: 0.0 if np.linalg.norm(s) <= c else np.inf),
+    "norm and square": (
+        E_ * inner(e, e) + C_ * norm(e),
+        lambda s, G, c: max(np.linalg.norm(s) - c, 0.0) ** 2 / (4 * G),
+    ),
+    "norm of the deviator and square": (
+        E_ * inner(e, e) + C_ * norm(dev(e)),
+        lambda s, G, c: max(np.linalg.norm(s @ DEV) - c, 0.0) ** 2 / (4 * G) + s[:3].sum() ** 2 / (12 * G),
+    ),
+    "positive trace and square": (
+        E_ * inner(e, e) + C_ * pos(tr(e)),
+        lambda s, G, c: (
+            (np.linalg.norm(s @ DEV) ** 2 + 3 * (s[:3].sum() / 3 - np.clip(s[:3].sum() / 3, 0, c)) ** 2) / (4 * G)
+        ),
+    ),
+    "trace of the positive part and square": (
+        E_ * inner(e, e) + C_ * tr(pos(e)),
+        lambda s, G, c: ((w := singular_values_of(s)) - np.clip(w, 0, c)) @ (w - np.clip(w, 0, c)) / (4 * G),
+    ),
+    "power of a norm": (
+        C_ * norm(e) ** 3,
+        lambda s, G, c: 2 / 3 * np.linalg.norm(s) * np.sqrt(np.linalg.norm(s) / (3 * c)),
+    ),
+}
+
+
+@pytest.mark.parametrize("word", KINKED)
+def test_claim_05_holds_for_energies_with_kinks(word):
+    """Closed conjugates of energies without a gradient everywhere, by rule and by certified number."""
+    energy, exact = KINKED[word]
+    G, c = 3.0, 2.0
+    rng = np.random.default_rng(52)
+    duals = rng.normal(size=(12, 6)) * 10.0 ** rng.uniform(-1, 1, size=(12, 1))
+    duals[0] = 0.0
+    rule = partial_conjugate(energy, e, names="s")
+    (dual,) = rule.duals.values()
+    found = rule.value({dual: duals, E_: G, C_: c})
+    for s, value in zip(duals, found, strict=True):
+        expected = exact(s, G, c)
+        assert value == pytest.approx(expected, rel=1e-9, abs=1e-12)
+        certified = numerical_conjugate(energy, e, {e: s}, {E_: G, C_: c})
+        assert certified.value == pytest.approx(expected, rel=1e-5, abs=1e-5)
+        if np.isfinite(expected):  # and the pair attains the equality, or the bound is off by no more than the gap
+            argument = certified.argument[e]
+            attained = float(evaluate(energy, {e: argument, E_: G, C_: c})) + expected - s @ argument
+            assert -1e-9 * (1 + abs(expected)) <= attained <= 1e-4 * (1 + abs(expected))
 
 
 def driven(name, rng, segments=3, steps=12):
@@ -374,3 +467,89 @@ def test_claim_10_stresses_of_the_phases_add_up_at_equal_strain():
     wire = LAWS["wire"].compile()(strains, None, lambda_w=v["lambda_w"], mu_w=v["mu_w"])
     assert together.stress == pytest.approx(sand.stress + wire.stress, rel=1e-12, abs=1e-9)
     assert together.state["p"] == pytest.approx(sand.state["p"], rel=1e-12, abs=1e-18)
+
+
+# -- claim 8 ---------------------------------------------------------------------------------------------------------------------
+
+
+def test_claim_08_the_sign_of_the_force_function_column_depends_on_the_conjugate():
+    """φ(x, y) quadratic: the conjugate in x alone has ∂φ*/∂y = −∂φ/∂y, the conjugate in both has ∂φ*/∂A = +y; the printed signs are the
+    first, the total conjugate of the study's [7] has the second."""
+    x, y = rates(scalar("x"), scalar("y"))
+    a, b, c = 2.0, 0.5, 1.25
+    phi = a / 2 * x**2 + b * x * y + c / 2 * y**2
+    one, both = partial_conjugate(phi, x, names="s"), total_conjugate(phi, x, y, names="s A")
+    (s,) = one.duals.values()
+    s_both, A = both.duals.values()
+    rng = np.random.default_rng(8)
+    for x_n, y_n in rng.normal(size=(20, 2)):
+        s_n, A_n = a * x_n + b * y_n, b * x_n + c * y_n  # = ∂φ/∂x, ∂φ/∂y
+
+        def first(t, s_n=s_n):
+            return float(one.value({s: s_n, y: t}))
+
+        def second(t, s_n=s_n):
+            return float(both.value({s_both: s_n, A: t}))
+
+        assert derivative(first, y_n, 1e-2) == pytest.approx(-A_n, rel=1e-9, abs=1e-9)
+        assert derivative(second, A_n, 1e-2) == pytest.approx(y_n, rel=1e-9, abs=1e-9)
+        # by formula, independently of the conjugates: φ*₁ = (s − b y)²/2a − c y²/2, φ* = ½ (s, A) Q⁻¹ (s, A)
+        assert first(y_n) == pytest.approx((s_n - b * y_n) ** 2 / (2 * a) - c / 2 * y_n**2)
+        pair = np.array([s_n, A_n])
+        assert second(A_n) == pytest.approx(pair @ np.linalg.solve([[a, b], [b, c]], pair) / 2)
+        # concave in what is not exchanged, convex in what is
+        assert first(y_n + 1) + first(y_n - 1) <= 2 * first(y_n)
+        assert second(A_n + 1) + second(A_n - 1) >= 2 * second(A_n)
+
+
+@pytest.mark.parametrize("name", [name for name in written if LAWS[name].forces])
+def test_claim_08_rates_follow_the_total_conjugate_with_a_plus_sign(name):
+    """At admissible forces, rates of ∂φ* satisfy φ(rates) + φ*(forces) = forces·rates; at no other admissible forces is the work larger."""
+    law, v, truth = truth_of(name)
+    rng = np.random.default_rng(81)
+    unit = truth.unit(SimpleNamespace(**v))
+    phi = total_conjugate(law)
+    start = {frozen(variable): 0.01 for variable in law.frozen}
+    start |= {} if law.temperature is None else {law.temperature: 300.0}
+    slots = {law.forces[variable]: variable for variable in law.forces}
+
+    def draw():
+        found = {}
+        for force, variable in slots.items():
+            width = () if isinstance(variable, ScalarVariable) else (6,)
+            heat = variable == law.temperature
+            found[force] = 1e2 * rng.normal(size=3) if heat else 2 * unit * rng.normal(size=width)
+        return found
+
+    def numbers(thing, forces):
+        return number(thing, law, v, {}, symbols=start | forces)
+
+    def surface_value(forces):
+        return max((float(numbers(f, forces)) for f in law.surfaces), default=-1.0)
+
+    def to_domain(forces):
+        """Scaled towards zero until inside, and on the boundary if they were outside."""
+        if surface_value(forces) <= 0:
+            return forces
+        scaled = brentq(lambda t: surface_value({k: t * x for k, x in forces.items()}), 0.0, 1.0, xtol=1e-15)
+        return {k: (1 - 1e-13) * scaled * x for k, x in forces.items()}
+
+    for _ in range(8):
+        forces = to_domain(draw())
+        rate = {force: numbers(partial(law.viscous, force), forces) for force in forces}
+        if law.surfaces:
+            values = [float(numbers(f, forces)) for f in law.surfaces]
+            j = int(np.argmax(values))
+            if values[j] >= -1e-9 * unit:
+                for force in forces:
+                    rate[force] = rate[force] + numbers(partial(law.surfaces[j], force), forces)
+        duals = {phi.duals[force]: np.broadcast_to(rate[force], np.shape(forces[force])) for force in forces}
+        table = {symbol: v[symbol.name] for symbol in law.parameters} | start | duals
+        dissipated = float(phi.value(table, rounding=1e-8))
+        work = sum(float(np.vdot(forces[k], rate[k])) for k in forces)
+        star = float(numbers(law.viscous, forces))
+        assert dissipated + star == pytest.approx(work, rel=1e-7, abs=1e-9 * unit)
+        assert dissipated >= 0
+        other = to_domain(draw())
+        bound = dissipated + float(numbers(law.viscous, other))
+        assert sum(float(np.vdot(other[k], rate[k])) for k in forces) <= bound + 1e-7 * (abs(work) + 1e-6 * unit)
