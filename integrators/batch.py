@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .cone_projection import EXPONENTIAL, EXPONENTIAL_DUAL, ORTHANT, POWER, POWER_DUAL, SECOND_ORDER, SEMIDEFINITE
-from .general import CONVERGED, ITERATION_LIMIT, ROUNDING, solve_points
+from .general import ITERATION_LIMIT, ROUNDING, solve_points
 from .step_program import StepProgram
 
 __all__ = ["INFEASIBLE", "BatchSolution", "interior_start", "run_engine", "run_interior", "slopes_of", "solve_batch"]

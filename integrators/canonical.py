@@ -1,6 +1,6 @@
 """Canonical data of a convex program that cvxpy declares: sizes, matrices and cones as plain arrays.
 
-    min ½ vᵀPv + qᵀv   subject to   E v = e,   h − G v ∈ K,
+    min ½ vᵀPv + qᵀv + constant   subject to   E v = e,   h − G v ∈ K,
 
 K a product of orthants, second-order, 3×3 semidefinite (Mandel components), exponential and power cones. cvxpy only declares and
 rewrites here; no solver runs.
@@ -59,6 +59,7 @@ class CanonicalForm:
     h: Array
     cones: tuple[Cone, ...]
     first: int
+    constant: float = 0.0
 
 
 def empty_form(size: int) -> CanonicalForm:

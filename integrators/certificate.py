@@ -1,11 +1,11 @@
-"""Duality gap of a computed step, evaluated outside the generated code.
+"""Duality gaps, evaluated outside the compiled engine.
 
-For increments Δ and forces Y at the end of the step, both admissible, primal minus dual is the Fenchel residual
+For a solution (y, λ) of min ½ yᵀPy + qᵀy + Σ g(s) over s = h − Gy ∈ K, with λ in K*,
 
-    gap = φ(Δ) + φ*(Y) − Y·Δ ≥ 0,
+    gap = primal − dual = yᵀPy + qᵀy + hᵀλ + Σ [g(s) + g*(−λ)] ≥ 0,
 
-as the state laws hold exactly by construction. Where the computed pair is not exactly admissible, the residual is
-bounded by what it takes to make it so: f(Y)₊ γ for the forces, and the excess of the flow over its cone for the increments.
+increased by what is missing to admissibility on both sides, so that a wrong answer cannot show a small gap. Of a step computed by another
+method, the distance to that solution, weighed with the forces, is added.
 """
 
 from __future__ import annotations
@@ -13,45 +13,188 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from .atoms import energy_atoms, flow_atoms
-from .update import Array, Update
+from ..potentials.derivative import partial
+from ..potentials.evaluate import evaluate
+from ..potentials.spectral import decompose, from_matrix
+from .cone_projection import ORTHANT, SECOND_ORDER, SEMIDEFINITE, project
+from .declared import components, declared_step
+from .general_step import GeneralStep, Part, StepSolution
+from .scalar_terms import ENTROPY_TERM, EXPONENTIAL_TERM, POWER_TERM
+from .step_program import StepProgram
 
-__all__ = ["duality_gap"]
+__all__ = ["duality_gap", "natural_map", "solution_gap", "term_values"]
+
+Array = NDArray[np.float64]
 
 
-def duality_gap(update: Update, eps: Array, old: Array, new: Array, values: Array) -> Array:
-    """Gap [J/m³] per point, shape (n,); sizes of violations are counted in, so that a wrong step cannot show a small gap."""
+def solution_gap(solution: StepSolution, count: int) -> Array:
+    """Gap [J/m³] at every point of a solution, shape (count,)."""
+    gap = np.zeros(count)
+    for part in solution.parts:
+        gap[part.points] = part_gap(part)
+    return gap
+
+
+def natural_map(part: Part) -> Array:
+    """Largest entry of (Py + q + Gᵀλ, λ − Π_{K*}(λ − s)) per point, relative to the size of (q, h); of a scalar term λ + g′(s)."""
+    program, y, multipliers, q, h, s = _arrays(part)
+    stationary = y * program.p + q + multipliers @ program.G
+    feasible = multipliers - dual_projection(program, multipliers - s)
+    for cone, place in _terms(program):
+        slack, multiplier = s[:, place], multipliers[:, place]
+        # where λ is steep in s, the mismatch is counted in s
+        feasible[:, place] = slack - _inverse_slope(cone, multiplier, slack)
+    size = np.maximum(np.abs(q).max(axis=1, initial=0.0), np.abs(h).max(axis=1, initial=0.0))
+    found = np.maximum(np.abs(stationary).max(axis=1, initial=0.0), np.abs(feasible).max(axis=1, initial=0.0))
+    return found / np.where(size > 0.0, size, 1.0)
+
+
+def part_gap(part: Part) -> Array:
+    """Gap [J/m³] of the points of one program."""
+    program, y, multipliers, q, h, s = _arrays(part)
+    stationary = y * program.p + q + multipliers @ program.G
+    value = np.einsum("ij,ij->i", y, y * program.p + q) + np.einsum("ij,ij->i", h, multipliers)
+    # Moreau: what s lacks to K is the part of −s in K*
+    missing = np.abs(dual_projection(program, -s))
+    outside = np.abs(multipliers - dual_projection(program, multipliers))
+    for cone, place in _terms(program):
+        missing[:, place] = outside[:, place] = 0.0
+        value = value + _term_gap(cone, s[:, place], multipliers[:, place])
+    size = np.abs(multipliers)
+    return (
+        np.abs(value)
+        + np.abs(stationary * y).sum(axis=1)
+        + (missing * size).sum(axis=1)
+        + (outside * np.abs(s)).sum(axis=1)
+    )
+
+
+def duality_gap(
+    update: Any, eps: Array, old: Array, new: Array, values: Array, *, dt: float = 1.0, temperature: Array | None = None
+) -> Array:
+    """Gap [J/m³] per point, shape (n,), of a step computed by any method: packed states `old`, `new`, packed parameter values."""
     law = update.law
     numbers = {p.name: float(v) for p, v in zip(law.parameters, values, strict=True)}
-    if not law.surfaces:
-        return np.zeros(len(eps))
-    energy, flow = energy_atoms(law, numbers), flow_atoms(law, numbers)
-    z = np.concatenate([eps, new], axis=1)
-    force = -(z @ energy.hessian + energy.linear)[:, 6:]
-    delta = new - old
-    row, limit, norms = flow.linear[0], flow.limits[0], flow.norms[0]
-    f = force @ row - limit + sum((a * np.linalg.norm(force @ m.T, axis=1) for a, m in norms), np.zeros(len(eps)))
-    gamma, residual = _multiplier(delta, row, norms)
-    size = np.linalg.norm(force, axis=1)
-    return np.abs(gamma * limit - np.einsum("ij,ij->i", force, delta)) + gamma * np.maximum(f, 0.0) + residual * size
+    step = GeneralStep.of(law, numbers, dt, declared_step(law))
+    best = step.solve(eps, old, temperature, tangent=False)
+    size = best.increment.shape[1]
+    known: dict[Any, Any] = {**step.parameters, law.observable: eps}
+    if temperature is not None:
+        known[law.temperature] = temperature
+    start = 0
+    for variable in law.internal:
+        length = components(variable)
+        known[variable] = new[:, start] if length == 1 else new[:, start : start + length]
+        start += length
+    given = []
+    for variable in law.internal:
+        force = np.asarray(-evaluate(partial(law.energy, variable), known))
+        length = components(variable)
+        given.append(np.broadcast_to(force.reshape(-1, length), (len(eps), length)))
+    forces = np.hstack(given) if given else np.zeros((len(eps), 0))
+    true = -best.slopes[:, 6 : 6 + size]
+    change = new[:, :size] - old[:, :size]
+    far, apart = change - best.increment, forces - true
+    return (
+        solution_gap(best, len(eps))
+        + np.abs(true * far).sum(axis=1)
+        + np.abs(apart * best.increment).sum(axis=1)
+        + np.abs(apart * far).sum(axis=1)
+    )
 
 
-def _multiplier(delta: Array, row: Array, norms: Any) -> tuple[Array, Array]:
-    """Smallest γ with Δ = γ ℓ + LᵀD, ‖D‖ ≤ aγ, and by how much Δ misses that form."""
-    if norms:
-        a, operator = norms[0]
-        basis = np.column_stack([row, operator.T])
-    else:
-        a, basis = 0.0, row[:, None]
-    found = delta @ np.linalg.pinv(basis).T
-    missed = np.linalg.norm(delta - found @ basis.T, axis=1)
-    gamma = found[:, 0]
-    if norms:
-        shear = np.linalg.norm(
-            found[:, 1:] @ (np.eye(6) - np.outer(np.r_[1, 1, 1, 0, 0, 0], np.r_[1, 1, 1, 0, 0, 0]) / 3.0), axis=1
-        )
-        if not row.any():
-            gamma = shear / a
-        missed = missed + np.maximum(shear - a * gamma, 0.0)
-    return gamma, missed + np.maximum(-gamma, 0.0)
+def _arrays(part: Part) -> tuple[StepProgram, Array, Array, Array, Array, Array]:
+    program = part.program.compact.program
+    y, multipliers = part.found.y, part.found.multipliers
+    q = program.q0 + part.data @ program.q1.T
+    h = program.h0 + part.data @ program.h1.T
+    return program, y, multipliers, q, h, h - y @ program.G.T
+
+
+def _terms(program: StepProgram) -> list[tuple[Any, int]]:
+    found, start = [], 0
+    for cone in program.cones:
+        if cone.kind >= POWER_TERM:
+            found.append((cone, start))
+        start += cone.size
+    return found
+
+
+def dual_projection(program: StepProgram, v: Array) -> Array:
+    """Π_{K*}(v) row by row, by numpy for the symmetric cones."""
+    out = v.copy()
+    start = 0
+    for cone in program.cones:
+        rows = slice(start, start + cone.size)
+        part = v[:, rows]
+        start += cone.size
+        if cone.kind == ORTHANT:
+            out[:, rows] = np.maximum(part, 0.0)
+        elif cone.kind == SECOND_ORDER:
+            t, length = part[:, 0], np.linalg.norm(part[:, 1:], axis=1)
+            half = np.clip(0.5 * (t + length), 0.0, None)
+            ratio = np.divide(half, length, out=np.zeros_like(half), where=length > 0.0)
+            mixed = np.column_stack([half, ratio[:, None] * part[:, 1:]])
+            out[:, rows] = np.where((length <= t)[:, None], part, np.where((length <= -t)[:, None], 0.0, mixed))
+        elif cone.kind == SEMIDEFINITE:
+            values, vectors = decompose(part)
+            out[:, rows] = from_matrix(np.einsum("nik,nk,njk->nij", vectors, np.maximum(values, 0.0), vectors))
+        elif cone.kind < POWER_TERM:
+            jacobian, work = np.zeros((6, 6)), np.zeros(24)
+            for row in range(len(v)):
+                taken = np.ascontiguousarray(part[row])
+                project(cone.kind, cone.alpha, taken, 0, 3, taken, jacobian, work)
+                out[row, rows] = taken
+    return out
+
+
+def term_values(program: StepProgram, s: Array) -> float:
+    """Σ g(s) of the scalar terms at one slack."""
+    total = 0.0
+    for cone, place in _terms(program):
+        total += float(_term_value(cone, s[place : place + 1])[0])
+    return total
+
+
+def _term_value(cone: Any, slack: Array) -> Array:
+    c, k = cone.alpha, cone.beta
+    with np.errstate(all="ignore"):
+        if cone.kind == POWER_TERM:
+            return c * np.abs(slack) ** k
+        if cone.kind == EXPONENTIAL_TERM:
+            return c * np.exp(slack / k)
+        if cone.kind == ENTROPY_TERM:
+            r = np.maximum(-slack, 0.0)
+            return c * np.where(r > 0.0, r * (np.log(r / k) - 1.0), 0.0)
+        return -c * np.log(slack)
+
+
+def _inverse_slope(cone: Any, multiplier: Array, slack: Array) -> Array:
+    """The s with −g′(s) = λ."""
+    with np.errstate(all="ignore"):
+        if cone.kind == POWER_TERM:
+            return -np.sign(multiplier) * (np.abs(multiplier) / (cone.alpha * cone.beta)) ** (1.0 / (cone.beta - 1.0))
+        if cone.kind == EXPONENTIAL_TERM:
+            gone = multiplier == 0.0
+            return np.where(gone, slack, cone.beta * np.log(-multiplier * cone.beta / cone.alpha))
+        if cone.kind == ENTROPY_TERM:
+            return -cone.beta * np.exp(multiplier / cone.alpha)
+        return cone.alpha / multiplier
+
+
+def _term_gap(cone: Any, slack: Array, multiplier: Array) -> Array:
+    """g(s) + g*(−λ), to which λ s is added in the sum over rows."""
+    c, k = cone.alpha, cone.beta
+    with np.errstate(all="ignore"):
+        if cone.kind == POWER_TERM:
+            conjugate = (k - 1.0) * c * (np.abs(multiplier) / (c * k)) ** (k / (k - 1.0))
+        elif cone.kind == EXPONENTIAL_TERM:
+            u = np.maximum(-multiplier, 0.0)
+            conjugate = np.where(u > 0.0, k * u * (np.log(k * u / c) - 1.0), 0.0)
+        elif cone.kind == ENTROPY_TERM:
+            conjugate = c * k * np.exp(multiplier / c)
+        else:
+            conjugate = -c + c * np.log(multiplier / c)
+    return _term_value(cone, slack) + conjugate

@@ -1,40 +1,37 @@
-"""The implicit step as a conic program: the incremental variational principle, declared through cvxpy.
+"""The implicit step at one point as a cvxpy problem in scaled units, for inspection, for reference and for other solvers.
 
-    min ψ(ε, X) + φ(X − X_n)   over ε, X   subject to   ε = ε_{n+1},
+    min ½ (e, y)ᵀ M (e, y) + gᵀ(e, y)   subject to   e = ε,   h₁ e + h − G y ∈ K,
 
-where φ, the support function of {f_j ≤ 0}, is written with multipliers: for f_j = Σ_i a_ji ‖L_ji A‖ + ℓ_j(A) − k_j,
-
-    φ(Δ) = min Σ_j k_j γ_j   subject to   Δ = Σ_j (γ_j ∇ℓ_j + Σ_i L_jiᵀ D_ji),  ‖D_ji‖ ≤ a_ji γ_j.
-
-The stress is the multiplier of ε = ε_{n+1}. Built from the declared atoms of ψ and φ*, independently of the closed form:
-quadratic terms by a factor of their Hessian, ⟨x⟩² as a squared positive part, T^≥:T^≥ as min ‖T + N‖² over N ⪰ 0 (the distance
-to the negative semidefinite tensors). Strains are counted in a yield strain and stresses in a yield stress, so that the
-program is well conditioned. The answer of the interior point is polished on the canonical data (see `polish`).
+the reduced program of the law (see `step_program`) with the strain as an unknown, so that the stress is the multiplier of e = ε. Nothing of
+the engine is used: cvxpy rewrites it and clarabel solves it. `solve` then polishes that answer by the engine.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, InputError
+from ..errors import ConvergenceError, InputError, Status
 from ..potentials import Law
-from .atoms import ConvexAtoms, FlowAtoms, energy_atoms, flow_atoms
-from .closed import state_layout
-from .convexity import worst_direction
-from .polish import ConeSizes, Program, polish
+from ..potentials.spectral import as_matrix, from_matrix
+from .batch import ROUNDING, BatchSolution, interior_start, slopes_of, solve_batch
+from .cone_projection import EXPONENTIAL, EXPONENTIAL_DUAL, ORTHANT, POWER, POWER_DUAL, SECOND_ORDER, SEMIDEFINITE
+from .general_step import GeneralStep, StepSolution
+from .step_program import StepProgram
 
-__all__ = ["ConicSolution", "ConicStep", "conic_step"]
+__all__ = ["ConicSolution", "ConicStep", "conic_step", "reference"]
+
+Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ConicSolution:
-    """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` [J/m³], `status` text and the
-    `residual`, the natural map of the whole program in its scaled units (zero at the solution and nowhere else)."""
+    """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` W = ψ + dt φ [J/m³], `status` text of clarabel and the
+    `residual`, the natural map of the program relative to its data (zero at the solution and nowhere else)."""
 
     stress: np.ndarray
     state: dict[str, Any]
@@ -45,159 +42,192 @@ class ConicSolution:
 
 @dataclass(frozen=True)
 class ConicStep:
-    """The declared program of one step at one point; `.problem` is the cvxpy problem, in scaled units."""
+    """The program of one step at one point; `.problem` is the cvxpy problem, its unknowns divided by `size`, strains also by `strain_unit`."""
 
     law: Law
+    update: Any
+    program: StepProgram
+    data: Array
+    eps: Array
+    old: Array
     problem: Any
     strain_constraint: Any
-    state_variable: Any
-    old: np.ndarray
+    unknowns: Any
+    cones: tuple[Any, ...]
+    size: float
     strain_unit: float
-    energy_unit: float
-    offset: float
 
     def solve(self, **options: Any) -> ConicSolution:
-        """Solve by clarabel and polish; `options` go to clarabel. Raises `ConvergenceError` if no solution is found."""
-        import cvxpy
-
-        data, chain, inverse = self.problem.get_problem_data(cvxpy.CLARABEL, solver_opts={})
-        program = _program(data)
-        found: Any = None
-        status, best = "", np.inf
-        for tolerance, equilibrate in ((1e-9, True), (1e-11, True), (1e-10, False), (1e-8, True)):
-            settings = {
-                **dict.fromkeys(("tol_gap_abs", "tol_gap_rel", "tol_feas"), tolerance),
-                "max_iter": 200,
-                "equilibrate_enable": equilibrate,
-                **options,
-            }
-            raw = chain.solver.solve_via_data(data, False, False, settings)
-            status = str(raw.status)
-            x, z = np.array(raw.x, dtype=float), np.array(raw.z, dtype=float)
-            if "Infeasible" in status:
-                break
-            if not (np.isfinite(x).all() and np.isfinite(z).all()):
-                continue
-            # an interior point stops at about the square root of its gap from a degenerate optimum; the polish does not
-            x, z, residual = polish(program, x, z)
-            if residual < best:
-                found, best = (x, z), residual
-            if best <= 1e-10:
-                break
-        if found is None or not best <= 1e-8:
+        """Solve by clarabel and polish; `options` go to cvxpy's `solve`. Raises `ConvergenceError` if no solution is found."""
+        start, status = self.interior(**options)
+        found = solve_batch(self.program, self.data, tangent=False, start=start)
+        if found.status[0] > ROUNDING:
             raise ConvergenceError(
                 f"law '{self.law.name}': the conic program has no solution here: clarabel says '{status}'"
             )
-        x, z = found
-        value = float(0.5 * x @ program.P @ x + program.q @ x)
-        done = SimpleNamespace(x=x, z=z, status="Solved", obj_val=value, solve_time=0.0, iterations=0)
-        self.problem.unpack_results(done, chain, inverse)
-        stress = -np.asarray(self.strain_constraint.dual_value).reshape(6) * self.energy_unit / self.strain_unit
-        change = (
-            np.zeros(0)
-            if self.state_variable is None
-            else np.asarray(self.state_variable.value).reshape(-1) * self.strain_unit
-        )
-        packed = self.old + change
-        layout, _ = state_layout(self.law)
-        state = {n: packed[s] if length == 1 else packed[s : s + 6] for n, (s, length) in layout.items()}
+        y = found.y
+        increment = self.program.compact.program.increments(self.data, y)
+        solution = StepSolution(found.slopes, None, increment, found.residual, found.status, found.counts, [])
+        new, _ = self.update.outcome(self.eps, self.old, solution)
+        unpacked = {n: v[0] for n, v in self.update.packing.unpack(new).items()}
         return ConicSolution(
-            stress, state, float(self.problem.value) * self.energy_unit + self.offset, self.problem.status, best
+            found.slopes[0, :6].copy(), unpacked, self._objective(found), status, float(found.residual[0])
         )
+
+    def interior(self, **options: Any) -> tuple[tuple[Array, Array], str]:
+        """clarabel's answer through cvxpy: (unknowns, multipliers) of the compact form, and its status."""
+        y, multipliers, status = self.unpolished(**options)
+        if y is None or multipliers is None:
+            if "infeasible" in status:
+                raise ConvergenceError(
+                    f"law '{self.law.name}': the conic program has no solution here: clarabel says '{status}'"
+                )
+            return interior_start(self.program, self.data)[0], status
+        small = self.program.compact
+        return (y[None, small.unknowns], multipliers[None, small.rows]), status
+
+    def unpolished(self, **options: Any) -> tuple[Array | None, Array | None, str]:
+        """(unknowns, multipliers) of the reduced program as clarabel leaves them, and its status."""
+        import cvxpy
+
+        try:
+            self.problem.solve(solver=cvxpy.CLARABEL, **options)
+        except cvxpy.SolverError:
+            return None, None, "failed"
+        status = str(self.problem.status)
+        if self.problem.value is None or not np.isfinite(self.problem.value):
+            return None, None, status
+        n = self.program.p.size
+        y = np.asarray(self.unknowns.value).reshape(-1) * self.size if n else np.zeros(0)
+        parts = [_dual(c, k.kind) for c, k in zip(self.cones, self.program.cones, strict=True)]
+        multipliers = np.concatenate(parts) * self.size if parts else np.zeros(0)
+        return y, multipliers, status
+
+    def _objective(self, found: BatchSolution) -> float:
+        from .certificate import term_values
+
+        program, d = self.program.compact.program, self.data[0]
+        y = found.y[0]
+        q, s = program.q0 + program.q1 @ d, program.h0 + program.h1 @ d - program.G @ y
+        constant = program.c0 + float(program.c1 @ d) + 0.5 * float(d @ program.C @ d)
+        return constant + float(0.5 * y @ (program.p * y) + q @ y) + term_values(program, s)
 
 
 def conic_step(law: Law, eps_new: Any, state: Mapping[str, Any] | None, values: Mapping[str, Any]) -> ConicStep:
-    """Declare the program of one step at one point: strain (6,), `state` by name or None, parameters by name.
+    """Declare the program of one step at one point: strain (6,), `state` by name or None; `values` are the parameters by name, the
+    temperature by its name, and `dt`, the time step [s], 1 if not given.
 
     Raises `InputError` for bad input and `DeclarationError` where an atom of the law has no conic form.
     """
+    from .general_update import GeneralUpdate
+
     eps = np.asarray(eps_new, dtype=float).reshape(-1)
     if eps.shape != (6,) or not np.isfinite(eps).all():
         raise InputError(f"conic: the strain has shape {np.shape(eps_new)}; it must be six finite Mandel components")
     law.check_evolution()
-    numbers = law.values(values)
-    layout, size = state_layout(law)
-    old = np.zeros(size)
-    for name, (start, length) in layout.items():
-        if state is not None:
-            if name not in state:
-                raise InputError(f"law '{law.name}': the state lacks the internal variable '{name}'")
-            old[start : start + length] = np.asarray(state[name], dtype=float).reshape(length)
-    return declare(law, energy_atoms(law, numbers), flow_atoms(law, numbers), eps, old)
+    given = dict(values)
+    dt = float(given.pop("dt", 1.0))
+    update = GeneralUpdate.of(law, False, "conic")
+    rows = {n: np.asarray(v, dtype=float)[None] for n, v in state.items()} if state is not None else None
+    old = update.packing.pack(rows, 1)
+    numbers, temperature = update.arguments(given, 1)
+    step = update.step(numbers, dt)
+    (_, program, data), *_ = step.groups(eps[None], old, temperature)
+    return declare(law, update, program, data, eps[None], old)
 
 
-def declare(law: Law, energy: ConvexAtoms, flow: FlowAtoms, eps: np.ndarray, old: np.ndarray) -> ConicStep:
-    """The cvxpy problem, in units of `strain_unit` and `energy_unit`."""
+def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array, old: Array) -> ConicStep:
+    """The cvxpy problem of one row of data."""
     import cvxpy as cp
 
-    size = old.size
-    stiffness = (
-        float(np.abs(np.diag(energy.hessian)).max(initial=0.0))
-        or max((w for w, *_ in energy.spectral), default=1.0)
-        or 1.0
+    d, n = data[0], program.p.size
+    rest = d.copy()
+    rest[:6] = 0.0
+    q, h = program.q0 + program.q1 @ d, program.h0 + program.h1 @ d
+    stiffness = float(np.diag(program.C)[:6].max(initial=0.0)) or 1.0
+    size = max(
+        float(np.abs(q).max(initial=0.0)), float(np.abs(h).max(initial=0.0)), float(np.abs(eps).max()) * stiffness**0.5
     )
-    limit = max((abs(k) for k in flow.limits), default=0.0)
-    point = np.concatenate([eps, old])
-    force = energy.hessian @ point + energy.linear
-    # the unit of strain follows the size of the step; the yield strain bounds it from below
-    strain_unit = (
-        max(limit / stiffness, float(np.abs(force).max(initial=0.0)) / stiffness, float(np.abs(eps).max(initial=0.0)))
-        or 1.0
-    )
-    energy_unit = stiffness * strain_unit**2
-    x_eps = cp.Variable(6)
-    x_new = cp.Variable(size) if size else None
-    change = x_eps if x_new is None else cp.hstack([x_eps, x_new])
-    base = np.concatenate([eps, old])
-    # variables: ε = eps + (x_eps) u, X = old + (x_new) u; quadratic part expanded about the base point
-    if worst_direction(energy.hessian) is not None or any(w < 0.0 for w, *_ in (*energy.positive, *energy.spectral)):
-        raise InputError(f"law '{law.name}': psi is not convex for these values; softening is not modelled")
-    for k in flow.limits:
-        if k < 0.0:
-            raise InputError(
-                f"law '{law.name}': f = {-k:g} at zero force; zero force would lie outside the elastic domain of phi_star"
-            )
-    values, vectors = np.linalg.eigh(energy.hessian / stiffness)
-    keep = values > 1e-14 * max(values.max(initial=0.0), 1e-300)
+    size = size or 1.0
+    strain_unit = 1.0 / stiffness**0.5
+    e = cp.Variable(6, name="eps")
+    y = cp.Variable(n) if n else None
+    point = cp.hstack([e, y]) if n else e
+    scale = np.concatenate([np.full(6, strain_unit), np.ones(n)])
+    M = np.block([[program.C[:6, :6], program.q1[:, :6].T], [program.q1[:, :6], np.diag(program.p)]])
+    values, vectors = np.linalg.eigh(scale[:, None] * M * scale[None, :])
+    keep = values > 1e-14 * max(float(values.max(initial=0.0)), 1e-300)
     factor = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
-    slope = force * strain_unit / energy_unit
-    objective = 0.5 * cp.sum_squares(factor @ change) + slope @ change
-    offset = 0.5 * base @ energy.hessian @ base + energy.linear @ base + energy.constant
-    constraints: list[Any] = []
-    for weight, row, shift in energy.positive:
-        start = (row @ base + shift) / strain_unit
-        objective = objective + (weight * strain_unit**2 / energy_unit) * cp.square(cp.pos(row @ change + start))
-    for weight, coefficient, shift in energy.spectral:
-        target = coefficient * x_eps + (coefficient * eps + shift) / strain_unit
-        part = _matrix(cp, target) + cp.Variable((3, 3), PSD=True)
-        objective = objective + (weight * strain_unit**2 / energy_unit) * cp.sum_squares(part)
-    if x_new is not None:
-        gamma = cp.Variable(len(flow.limits))
-        constraints.append(gamma >= 0)
-        total: Any = 0
-        for j, (linear, norms) in enumerate(zip(flow.linear, flow.norms, strict=True)):
-            total = total + gamma[j] * linear
-            for a, operator in norms:
-                direction = cp.Variable(6)
-                constraints.append(cp.norm(direction, 2) <= a * gamma[j])
-                total = total + operator.T @ direction
-        constraints.append(x_new == total)
-        objective = objective + (np.array(flow.limits) * strain_unit / energy_unit) @ gamma
-    fixed = x_eps == np.zeros(6)
+    slope = np.concatenate([program.c1[:6] + program.C[:6] @ rest, program.q0 + program.q1 @ rest]) * scale / size
+    objective = 0.5 * cp.sum_squares(factor @ point) + slope @ point
+    shift = (program.h0 + program.h1 @ rest) / size
+    strains = program.h1[:, :6] * strain_unit
+    slack = shift + strains @ e - (program.G @ y if n else 0.0) if shift.size else None
+    cones, constraints = [], []
+    start = 0
+    for cone in program.cones:
+        constraint, shown = _constraint(cp, cone, slack[start : start + cone.size])  # type: ignore[index]
+        start += cone.size
+        cones.append(shown)
+        constraints.append(constraint)
+    fixed = e == eps[0] / (strain_unit * size)
     problem = cp.Problem(cp.Minimize(objective), [fixed, *constraints])
-    return ConicStep(law, problem, fixed, x_new, old, strain_unit, energy_unit, float(offset))
+    return ConicStep(law, update, program, data, eps, old, problem, fixed, y, tuple(cones), size, strain_unit)
 
 
-def _program(data: Any) -> Program:
-    """Canonical data of cvxpy for clarabel, dense."""
-    sizes = data["dims"]
-    upper = np.triu(data["P"].toarray()) if data.get("P") is not None else np.zeros((data["c"].size,) * 2)
-    cones = ConeSizes(sizes.zero, sizes.nonneg, tuple(sizes.soc), tuple(sizes.psd))
-    return Program(upper + np.triu(upper, 1).T, data["c"], data["A"].toarray(), data["b"], cones)
+def _constraint(cp: Any, cone: Any, s: Any) -> tuple[Any, Any]:
+    """cvxpy constraint s ∈ K; the duals of the exponential and power cones as images of the cones."""
+    if cone.kind == ORTHANT:
+        found = s >= 0
+    elif cone.kind == SECOND_ORDER:
+        found = cp.SOC(s[0], s[1:])
+    elif cone.kind == SEMIDEFINITE:
+        found = as_matrix(s) >> 0
+    elif cone.kind == EXPONENTIAL:
+        found = cp.ExpCone(s[0], s[1], s[2])
+    elif cone.kind == EXPONENTIAL_DUAL:
+        found = cp.ExpCone(-s[1], -s[0], np.e * s[2])
+    else:
+        unit = (1.0, 1.0) if cone.kind == POWER else (1.0 / cone.alpha, 1.0 / (1.0 - cone.alpha))
+        found = cp.PowCone3D(unit[0] * s[0], unit[1] * s[1], s[2], cone.alpha)
+    return found, (found, cone)
 
 
-def _matrix(cp: Any, mandel: Any) -> Any:
-    half = np.sqrt(0.5)
-    a, b, c = mandel[0], mandel[1], mandel[2]
-    f, e, d = half * mandel[3], half * mandel[4], half * mandel[5]
-    return cp.bmat([[a, d, e], [d, b, f], [e, f, c]])
+def _dual(shown: Any, kind: int) -> Array:
+    """Multiplier in the dual cone, in the order of the rows."""
+    constraint, cone = shown
+    value = constraint.dual_value
+    if kind == SECOND_ORDER:
+        return np.concatenate([np.ravel(value[0]), np.ravel(value[1])])
+    if kind == SEMIDEFINITE:
+        return from_matrix(0.5 * (np.asarray(value) + np.asarray(value).T))
+    if kind == ORTHANT:
+        return np.ravel(value)
+    x, y, z = (float(np.ravel(v)[0]) for v in value)
+    if kind == EXPONENTIAL_DUAL:
+        return np.array([-y, -x, np.e * z])
+    if kind == POWER_DUAL:
+        return np.array([x / cone.alpha, y / (1.0 - cone.alpha), z])
+    assert kind in (EXPONENTIAL, POWER)
+    return np.array([x, y, z])
+
+
+def reference(step: GeneralStep, eps: Array, old: Array, temperature: Array | None) -> StepSolution:
+    """The step at every point through cvxpy and clarabel, as they leave it; slow, without tangent."""
+    from .general_update import GeneralUpdate
+
+    update = GeneralUpdate.of(step.law, False, "cvxpy")
+    n = len(eps)
+    slopes, increment = np.zeros((n, 6 + old.shape[1])), np.zeros((n, step.program_size))
+    residual, status = np.zeros(n), np.zeros(n, dtype=np.int64)
+    for points, program, data in step.groups(eps, old, temperature):
+        for row, i in enumerate(np.arange(n)[points]):
+            given = declare(step.law, update, program, data[row : row + 1], eps[i : i + 1], old[i : i + 1])
+            y, multipliers, said = given.unpolished()
+            if y is None or multipliers is None:
+                status[i] = Status.INFEASIBLE if "infeasible" in said else Status.ITERATION_LIMIT
+                continue
+            slopes[i] = slopes_of(program, data[row : row + 1], y[None], multipliers[None])[0, : slopes.shape[1]]
+            slopes[i, :6] = -given.strain_constraint.dual_value * given.size / given.strain_unit
+            increment[i] = program.increments(data[row : row + 1], y[None])[0]
+    return StepSolution(slopes, None, increment, residual, status, np.zeros(n, dtype=np.int64), [])

@@ -1,6 +1,6 @@
 """Material-point test of a law along a path file: the steps as given, under mixed control.
 
-A law without closed form is driven by its conic program, some seconds per step where stresses are prescribed.
+A law without closed form is driven by the general engine, some milliseconds per step.
 """
 
 from __future__ import annotations
@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..potentials import Law
-from .conic_update import ConicUpdate
+from .general_update import GeneralUpdate
 from .history import History, drive_arrays
 from .path_file import StrainStressPath, read_path
 from .update import Update, build_update
@@ -19,7 +19,7 @@ __all__ = ["drive"]
 
 
 def drive(
-    law: Law | Update | ConicUpdate,
+    law: Law | Update | GeneralUpdate,
     path: StrainStressPath | str | Path,
     values: Mapping[str, Any],
     initial_state: Mapping[str, Any] | None = None,
@@ -31,7 +31,7 @@ def drive(
     Raises `InputError` for bad input, `ConvergenceError` with the row where the path cannot be followed.
     """
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
-    update = law if isinstance(law, (Update, ConicUpdate)) else build_update(law, solver=solver)
+    update = law if isinstance(law, (Update, GeneralUpdate)) else build_update(law, solver=solver)
     return drive_arrays(
         update,
         plan.control,
@@ -41,4 +41,5 @@ def drive(
         trace_targets=plan.trace_targets,
         initial_state=initial_state,
         times=plan.time,
+        temperatures=plan.temperature,
     )

@@ -60,13 +60,18 @@ class GeneralStep:
     dt: float
     declared: DeclaredStep
     _programs: dict[bytes, StepProgram] = field(default_factory=dict)
-    _affine: tuple[Array, StepProgram] | None | bool = None
+    _affine: tuple[Array, StepProgram] | bool | None = None
 
     @classmethod
     def of(cls, law: Law, values: Mapping[str, float], dt: float, declared: DeclaredStep | None = None) -> GeneralStep:
         """`values` by name, checked already."""
         numbers = {p: float(values[p.name]) for p in law.parameters}
         return cls(law, numbers, dt, declared or declared_step(law))
+
+    @property
+    def program_size(self) -> int:
+        """Number of components of the internal variables."""
+        return packed_layout(self.law)[1]
 
     def program(self, row: Array) -> StepProgram:
         """Program at one row of coefficients."""

@@ -16,8 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
-from .conic_path import follow
-from .conic_update import ConicUpdate
+from .general_path import follow
+from .general_update import GeneralUpdate
+from .path_loop import path_loop
+from .thermal import thermal_input, thermal_results
 from .update import Array, Update, packed_values
 
 __all__ = ["History", "drive_arrays"]
@@ -30,7 +32,8 @@ TURNS = 60
 class History:
     """Path of one material point, one row per step.
 
-    `eps` [-] and `sig` [Pa] (n, 6), Mandel; `state` by name; `psi` [J/m³] (n,); `dissipation` accumulated [J/m³] (n,); `status` (n,).
+    `eps` [-] and `sig` [Pa] (n, 6), Mandel; `state` by name; `psi` [J/m³] (n,); `dissipation` accumulated [J/m³] (n,); `status` (n,); of a
+    law with a temperature also `temperature` [K] (n,) and `entropy` [J/(m³ K)] (n,).
     """
 
     eps: Array
@@ -39,10 +42,12 @@ class History:
     psi: Array
     dissipation: Array
     status: NDArray[np.int64]
+    temperature: Array | None = None
+    entropy: Array | None = None
 
 
 def drive_arrays(
-    update: Update | ConicUpdate,
+    update: Update | GeneralUpdate,
     control: Any,
     targets: Any,
     values: Mapping[str, Any],
@@ -53,13 +58,15 @@ def drive_arrays(
     initial_state: Mapping[str, Any] | None = None,
     tolerance: float = TOLERANCE,
     times: Any = None,
+    temperatures: Any = None,
 ) -> History:
     """Follow a path, one step per row of `targets`.
 
     `control` (6,): True where the stress [Pa] is prescribed, False where the strain [-] is; `targets` (n, 6) the prescribed values,
     Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
     condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the stress scale;
-    `times` (n,), where given, are named in messages beside the row.
+    `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference) and are named in
+    messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
     mask = np.asarray(control, dtype=bool)
@@ -94,9 +101,14 @@ def drive_arrays(
         start = np.full(6, np.nan)
     if not np.isfinite(start).all():
         raise InputError("drive: initial_strain must be six finite Mandel components")
-    if isinstance(update, ConicUpdate):
-        return _run_conic(update, plan, update.law.admissible_values(values), start, initial_state, times)
-    return _run(update, plan, packed_values(update, values), start, initial_state, tolerance, times)
+    if isinstance(update, GeneralUpdate):
+        return _run_general(update, plan, values, start, initial_state, times, temperatures)
+    given = dict(values)
+    if temperatures is not None:
+        if update.law.temperature is None:
+            raise InputError(f"law '{update.law.name}' has no temperature; leave the temperatures out")
+        given[update.law.temperature.name] = temperatures
+    return _run(update, plan, given, start, initial_state, tolerance, times)
 
 
 @dataclass(frozen=True)
@@ -144,18 +156,29 @@ def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace:
 def _run(
     update: Update,
     plan: _Plan,
-    values: Array,
+    given: Mapping[str, Any],
     start: Array,
     initial_state: Mapping[str, Any] | None,
     tolerance: float,
     times: Any,
 ) -> History:
     n = len(plan.base)
-    eps, sig = np.zeros((n, 6)), np.zeros((n, 6))
-    state = np.zeros((n, update.state_size))
-    psi, dissipation = np.zeros(n), np.zeros(n)
+    heat, values = thermal_input(update.law, given, n)
+    parameters = packed_values(update, values)
+    pointers = update.pointers
+    # a law that is not viscous has one row of coefficients for all steps
+    steps = _time_steps(times, n) if update.module.VISCOUS and times is not None else 1.0
+    coefficients = pointers.coefficients(parameters, steps, heat.temperature)
+    eps, sig, state = np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, update.state_size))
+    dissipation = np.zeros(n)
     old = update.pack(initial_state, 1)[0]
-    failed, residual, scale = update.module.drive_(
+    failed, residual, scale = path_loop()(
+        pointers.step,
+        pointers.method,
+        pointers.law,
+        pointers.rest,
+        pointers.plan,
+        coefficients,
         plan.base,
         plan.goal,
         plan.z,
@@ -166,30 +189,48 @@ def _run(
         eps,
         sig,
         state,
-        psi,
         dissipation,
-        values,
         tolerance,
         TURNS,
     )
     _raise_failure(update.law.name, failed, residual, scale, times)
-    return History(eps, sig, update.unpack(state), psi, dissipation, np.zeros(n, dtype=np.int64))
+    psi = update.energies(eps, state, heat.temperature, parameters)
+    found = update.unpack(state)
+    entropy, _ = thermal_results(update.law, heat, eps, found, values)
+    temperature = None if update.law.temperature is None else np.broadcast_to(heat.temperature, (n,)).copy()
+    return History(eps, sig, found, psi, dissipation, np.zeros(n, dtype=np.int64), temperature, entropy)
 
 
-def _run_conic(
-    update: ConicUpdate,
+def _run_general(
+    update: GeneralUpdate,
     plan: _Plan,
-    values: Mapping[str, float],
+    values: Mapping[str, Any],
     start: Array,
     initial_state: Mapping[str, Any] | None,
     times: Any,
+    temperatures: Any,
 ) -> History:
-    state = update.packing.unpack(update.packing.pack(initial_state, 1))
-    failed, residual, scale, found = follow(update, plan.base, plan.goal, plan.z, plan.v, start, state, values)
+    n = len(plan.base)
+    given = None if initial_state is None else {k: np.asarray(v, dtype=float) for k, v in initial_state.items()}
+    packed = update.packing.pack(given, 1)
+    failed, residual, scale, found = follow(
+        update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, _time_steps(times, n), temperatures
+    )
     _raise_failure(update.law.name, failed, residual, scale, times)
-    status = np.zeros(len(plan.base), dtype=np.int64)
     unpacked = update.packing.unpack(found["state"])
-    return History(found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], status)
+    return History(
+        found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], np.zeros(n, dtype=np.int64)
+    )
+
+
+def _time_steps(times: Any, count: int) -> Array:
+    """Differences of the times; the first row, the start of the path, and rows without times count as one unit."""
+    if times is None:
+        return np.ones(count)
+    steps = np.diff(np.asarray(times, dtype=float))
+    if not (np.isfinite(steps).all() and (steps > 0.0).all()):
+        raise InputError("drive: the times must increase from row to row")
+    return np.concatenate([[float(steps[0]) if steps.size else 1.0], steps])
 
 
 def _raise_failure(name: str, failed: int, residual: float, scale: float, times: Any) -> None:

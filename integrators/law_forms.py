@@ -106,7 +106,7 @@ def _canonical(
     P, q = form.P.copy(), form.q.copy()
     P[:size, :size] += 0.5 * (quadratic.Q + quadratic.Q.T)
     q[:size] += quadratic.g
-    return CanonicalForm(P, q, form.E, form.e, form.G, form.h, form.cones, size)
+    return CanonicalForm(P, q, form.E, form.e, form.G, form.h, form.cones, size, quadratic.c)
 
 
 def _part(vector: Any, variable: Any, start: int) -> Any:

@@ -44,6 +44,7 @@ class FlowForm:
     G: Array
     h: Array
     cones: tuple[Cone, ...]
+    constant: float = 0.0
 
 
 def _factor_of(P: Array) -> Array:
@@ -65,7 +66,16 @@ def flow_of_dual(form: CanonicalForm, dt: float) -> FlowForm:
     G = np.zeros((cone_rows, size))
     G[:, :cone_rows] = -np.eye(cone_rows)
     return FlowForm(
-        P, q, maps[:k], dt * form.q[:k], maps[k:], -dt * form.q[k:], G, np.zeros(cone_rows), dual_cones(form.cones)
+        P,
+        q,
+        maps[:k],
+        dt * form.q[:k],
+        maps[k:],
+        -dt * form.q[k:],
+        G,
+        np.zeros(cone_rows),
+        dual_cones(form.cones),
+        -dt * form.constant,
     )
 
 
@@ -74,7 +84,9 @@ def flow_of_rates(form: CanonicalForm, dt: float) -> FlowForm:
     size, k = form.q.size, form.first
     L = np.zeros((k, size))
     L[:, :k] = dt * np.eye(k)
-    return FlowForm(dt * form.P, dt * form.q, L, np.zeros(k), form.E, form.e, form.G, form.h, form.cones)
+    return FlowForm(
+        dt * form.P, dt * form.q, L, np.zeros(k), form.E, form.e, form.G, form.h, form.cones, dt * form.constant
+    )
 
 
 @dataclass(frozen=True)
@@ -180,6 +192,7 @@ def assemble(
         slope += W.T @ flow.q
     full[0, :] += slope
     full[:, 0] += slope
+    full[0, 0] += 2.0 * (energy.constant + (0.0 if flow is None else flow.constant))
     return _reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from types import ModuleType
 from typing import Any
 
@@ -17,14 +18,16 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
-from .closed import state_layout
 from .module_store import load_module
-from .structure import NoConeStructure
+from .pointers import StepPointers, step_pointers
+from .structure import NoReduction, state_layout
+from .thermal import thermal_input, thermal_results
 
-__all__ = ["StepResult", "Update", "build_update", "packed_values"]
+__all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
 
 Array = NDArray[np.float64]
-_EMPTY: Array = np.zeros((0, 6, 6))
+REDUCED = ("closed", "reduced", "principal")
+GENERAL = ("general", "conic", "cvxpy")
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,8 @@ class StepResult:
     """Result of one step at n points.
 
     `stress` [Pa] (n, 6) and `tangent` [Pa] (n, 6, 6) in Mandel components; `state` by name, tensors (n, 6), scalars (n,);
-    `dissipation` of the step [J/m³] (n,); `status` (n,) of `Status` codes; `gap` [J/m³] (n,), primal minus dual, if certified.
+    `dissipation` of the step [J/m³] (n,), mechanical; `status` (n,) of `Status` codes; `gap` [J/m³] (n,), primal minus dual, if certified.
+    Of a law with a temperature: `entropy` [J/(m³ K)] (n,), and `flux` −q/T [W/(m² K)] (n, 3) if φ* mentions the gradient of temperature.
     """
 
     stress: Array
@@ -41,6 +45,8 @@ class StepResult:
     dissipation: Array
     status: NDArray[np.int64]
     gap: Array | None = None
+    entropy: Array | None = None
+    flux: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -53,6 +59,7 @@ class Update:
     solver: str = "closed"
     layout: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     state_size: int = 0
+    why: str = ""
 
     def initial_state(self, point_count: int = 1) -> dict[str, Array]:
         """Virgin state: all internal variables zero."""
@@ -62,7 +69,7 @@ class Update:
 
     def unpack(self, packed: Array) -> dict[str, Array]:
         """Views of a packed state (n, state_size) by name."""
-        return {n: packed[:, s] if length == 1 else packed[:, s : s + 6] for n, (s, length) in self.layout.items()}
+        return {n: packed[:, s] if length == 1 else packed[:, s : s + length] for n, (s, length) in self.layout.items()}
 
     def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
         """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""
@@ -78,7 +85,7 @@ class Update:
             if name not in state:
                 raise InputError(f"law '{self.law.name}': the state lacks the internal variable '{name}'")
             value = np.asarray(state[name], dtype=float)
-            shape = (point_count,) if length == 1 else (point_count, 6)
+            shape = (point_count,) if length == 1 else (point_count, length)
             if value.shape != shape:
                 try:
                     value = np.broadcast_to(value, shape)
@@ -91,6 +98,11 @@ class Update:
             packed[:, start : start + length] = value.reshape(point_count, length)
         return packed
 
+    @cached_property
+    def pointers(self) -> StepPointers:
+        """The compiled step with the law's own functions."""
+        return step_pointers(self.module)
+
     def __call__(
         self,
         eps_new: Any,
@@ -102,33 +114,53 @@ class Update:
     ) -> StepResult:
         """Step to the strains `eps_new` [-], Mandel components, shape (n, 6) or (6,).
 
-        `state` is an earlier `.state` or None; `dt` [s] has no effect on rate-independent laws; `values` are the parameters by name.
-        Raises `InputError` for bad input and `ConvergenceError`, naming the first points, where the step fails.
+        `state` is an earlier `.state` or None; `dt` [s] matters to viscous laws only; `values` are the parameters by name. A law with a
+        temperature takes it [K] under its name, a number or (n,), and its gradient [K/m], (3,) or (n, 3), under the name of the
+        force that φ* gives it (zero if not given). Raises `InputError` for bad input and `ConvergenceError`, naming the first
+        points, where the step fails.
         """
         eps = strain_array(eps_new)
-        if not (np.isfinite(dt) and dt > 0):
-            raise InputError(f"dt = {dt}: the time step must be positive and finite")
-        packed_parameters = packed_values(self, values)
         n = eps.shape[0]
+        heat, values = thermal_input(self.law, values, n)
+        packed_parameters = packed_values(self, values)
+        coefficients = self.pointers.coefficients(packed_parameters, step_time(dt), heat.temperature)
         old = self.pack(state, n)
         new, stress = np.empty_like(old), np.empty((n, 6))
-        tangent = np.empty((n, 6, 6)) if self.tangent else np.empty((1, 6, 6))
+        tangent = np.empty((n, 36)) if self.tangent else np.empty((1, 36))
         dissipation, status = np.empty(n), np.empty(n, dtype=np.int64)
-        self.module.batch_(eps, old, new, stress, tangent, self.tangent, dissipation, status, packed_parameters)
+        if n:
+            self.pointers.run(eps, old, new, stress, tangent, self.tangent, dissipation, status, coefficients)
         raise_failures(status, eps)
         gap = None
         if certify:
             from .certificate import duality_gap
 
-            gap = duality_gap(self, eps, old, new, packed_parameters)
-        return StepResult(stress, tangent if self.tangent else None, self.unpack(new), dissipation, status, gap)
+            heated = heat.temperature if self.law.temperature is not None else None
+            gap = duality_gap(self, eps, old, new, packed_parameters, dt=dt, temperature=heated)
+        found = self.unpack(new)
+        entropy, flux = thermal_results(self.law, heat, eps, found, values)
+        shaped = tangent.reshape(n, 6, 6) if self.tangent else None
+        return StepResult(stress, shaped, found, dissipation, status, gap, entropy, flux)
 
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
-        """Free energy ψ [J/m³] at the given strains and internal variables, shape (n,)."""
+        """Free energy ρψ [J/m³] at the given strains and internal variables, shape (n,)."""
         strain = strain_array(eps)
-        psi = np.empty(strain.shape[0])
-        self.module.energies_(strain, self.pack(state, strain.shape[0]), psi, packed_values(self, values))
+        heat, values = thermal_input(self.law, values, strain.shape[0])
+        packed = self.pack(state, strain.shape[0])
+        return self.energies(strain, packed, heat.temperature, packed_values(self, values))
+
+    def energies(self, eps: Array, packed: Array, temperature: Array, parameters: Array) -> Array:
+        """ρψ [J/m³] of packed states, shape (n,)."""
+        psi = np.empty(eps.shape[0])
+        self.module.energies_(eps, packed, temperature, parameters, psi)
         return psi
+
+
+def step_time(dt: Any) -> float:
+    """The time step [s], checked."""
+    if not (np.ndim(dt) == 0 and np.isfinite(dt) and dt > 0):
+        raise InputError(f"dt = {dt}: the time step must be positive and finite")
+    return float(dt)
 
 
 def strain_array(eps: Any) -> Array:
@@ -171,26 +203,27 @@ def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
 def build_update(
     law: Law, dimension: str = "3d", *, formulation: str = "strain", solver: str = "auto", tangent: bool = True
 ) -> Any:
-    """Choose the cheapest exact method for the law: `closed` where the structure is found, else `conic` (slow, any conic law)."""
+    """Choose the cheapest exact method for the law: `closed`, else `reduced`, else `principal`, else `general` (any convex law); or take
+    the one that is named. `.solver` and `.why` of what is returned say which and why."""
     if dimension != "3d":
         raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
     if formulation != "strain":
         raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
-    if solver not in ("auto", "closed", "conic"):
-        raise InputError(f"solver {solver!r} is not known; it is one of auto, closed, conic")
+    if solver not in ("auto", *REDUCED, *GENERAL):
+        raise InputError(f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL))}")
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
-    if solver != "conic":
+    why = "asked for by name"
+    if solver == "auto" or solver in REDUCED:
         try:
-            module = load_module(law)
+            module = load_module(law, solver)
             layout, size = state_layout(law)
-            return Update(law, module, tangent, "closed", layout, size)
-        except NoConeStructure as reason:
-            if solver == "closed":
+            return Update(law, module, tangent, module.METHOD.split()[0], layout, size, module.WHY)
+        except NoReduction as reason:
+            if solver != "auto":
                 raise
-            why = reason
-            del why
-    from .conic_update import ConicUpdate
+            why = f"no cheaper method: {reason}"
+    from .general_update import GeneralUpdate
 
-    return ConicUpdate.of(law, tangent)
+    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why)
