@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..cache import content_hash
 
-__all__ = ["files_hash", "rooms_hash"]
+__all__ = ["files_hash", "kernels_hash", "rooms_hash"]
 
 
 @functools.cache
@@ -46,3 +46,14 @@ def files_hash(*names: str) -> str:
     for file in (*(root / name for name in sorted(names)), root.parent / "cache.py"):
         parts += [file.name, file.read_bytes()]
     return content_hash(*parts)
+
+
+@functools.cache
+def kernels_hash() -> str:
+    """Hash of the files whose compiled functions call each other: those that name this function or compile a pointer, and their plan."""
+    names = []
+    for file in Path(__file__).parent.glob("*.py"):
+        data = file.read_bytes()
+        if b"kernels_hash" in data or b"compiled(" in data or file.name == "plan.py":
+            names.append(file.name)
+    return files_hash(*names)

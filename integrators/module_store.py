@@ -13,7 +13,9 @@ from ..cache import cache_folder, content_hash
 from ..errors import InputError, StorageError
 from ..potentials import Law
 from .closed import closed_module
+from .declared_text import declared_module
 from .key import rooms_hash
+from .structure import NoReduction
 
 __all__ = ["load_module", "module_source"]
 
@@ -22,18 +24,21 @@ def module_source(law: Law, dimension: str = "3d") -> str:
     """Text of the generated module, the same on every machine."""
     if dimension != "3d":
         raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
-    return closed_module(law)
+    try:
+        return closed_module(law)
+    except NoReduction as reason:
+        return declared_module(law, str(reason))
 
 
-def load_module(law: Law) -> ModuleType:
+def load_module(law: Law, solver: str = "auto") -> ModuleType:
     """Generated module of the law, from memory, else from disk, else written now. The key is formed before any differentiation."""
-    key = content_hash(law.text, rooms_hash())
+    key = content_hash(law.text, solver, rooms_hash())
     name = f"fenchel_law_{law.name}_{key}"
     if name in sys.modules:
         return sys.modules[name]
     path = cache_folder() / "laws" / f"{name}.py"
     if not path.is_file():
-        _write(path, closed_module(law))
+        _write(path, closed_module(law, solver))
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

@@ -2,7 +2,8 @@
 
 `PATH.csv` has a column `t` [s] and, per component, at most one of `eps_xx` (prescribed strain [-]) and `sig_xx` (prescribed stress
 [Pa]); a component without column has zero stress. A column `eps_v` (volume strain [-]) or `p` (mean pressure [Pa]) takes the place of the
-normal components without column, which then share one stress. The first row is the virgin state and zero.
+normal components without column, which then share one stress. An optional column `T` [K] is the temperature, for a law that has one; the
+time steps of a viscous law are the differences of `t`. The first row is the virgin state and zero, except for `t` and `T`.
 """
 
 from __future__ import annotations
@@ -27,13 +28,15 @@ _KNOWN = ("t", *(f"eps_{c}" for c in COMPONENTS), *(f"sig_{c}" for c in COMPONEN
 
 @dataclass(frozen=True)
 class StrainStressPath:
-    """Prescribed path: `time` (n,); `control` (6,) True where stress is prescribed; `targets` (n, 6) Mandel; trace condition."""
+    """Prescribed path: `time` (n,); `control` (6,) True where stress is prescribed; `targets` (n, 6) Mandel; trace condition;
+    `temperature` (n,) [K] or None."""
 
     time: np.ndarray
     control: np.ndarray
     targets: np.ndarray
     trace: str | None = None
     trace_targets: np.ndarray | None = None
+    temperature: np.ndarray | None = None
 
 
 def read_path(file: str | Path) -> StrainStressPath:
@@ -61,6 +64,11 @@ def read_path(file: str | Path) -> StrainStressPath:
                 f"path file '{path}', row {first}, column '{name}': the first row is the virgin state and must be zero, not {value:g}"
             )
     time = table[:, header.index("t")]
+    if "T" in header and not (table[:, header.index("T")] > 0.0).all():
+        cold = int(np.argmax(~(table[:, header.index("T")] > 0.0)))
+        raise InputError(
+            f"path file '{path}', row {rows[1 + cold][0]}, column 'T': a temperature is positive, in kelvin"
+        )
     late = np.flatnonzero(np.diff(time) <= 0)
     if late.size:
         raise InputError(
@@ -81,8 +89,6 @@ def _check_header(path: Path, header: list[str]) -> None:
     for c in COMPONENTS:
         if f"eps_{c}" in header and f"sig_{c}" in header:
             raise InputError(f"{where}: both 'eps_{c}' and 'sig_{c}' are given; prescribe one of them")
-    if "T" in header:
-        raise InputError(f"{where}: column 'T': the laws have no temperature; take the column out")
     if "eps_v" in header and "p" in header:
         raise InputError(f"{where}: both 'eps_v' and 'p' are given; one of them may replace one component")
     for name in ("eps_v", "p"):
@@ -120,11 +126,12 @@ def _path(header: list[str], table: np.ndarray, time: np.ndarray) -> StrainStres
         if trace is not None and i < 3 and f"eps_{c}" not in header and f"sig_{c}" not in header:
             targets[:, i] = np.nan
     condition = None if trace is None else table[:, header.index(trace)]
-    return StrainStressPath(time, control, targets, trace, condition)
+    heat = table[:, header.index("T")].copy() if "T" in header else None
+    return StrainStressPath(time, control, targets, trace, condition, heat)
 
 
 def write_history(file: str | Path, history: History, time: Any = None) -> None:
-    """Write `OUT.csv`: t, eps_*, sig_*, eps_v, p, q, internal variables, psi, dissipation, status.
+    """Write `OUT.csv`: t, (T,) eps_*, sig_*, eps_v, p, q, internal variables, (entropy,) psi, dissipation, status.
 
     `p` is the mean pressure −tr σ/3 and `q` = √(3 J₂). A scalar internal variable whose name is taken is written as `internal_<name>`.
     """
@@ -142,6 +149,8 @@ def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]
     """Columns of `OUT.csv` by name."""
     n = len(history.psi)
     columns: dict[str, np.ndarray] = {"t": np.arange(n, dtype=float) if time is None else np.asarray(time, dtype=float)}
+    if history.temperature is not None:
+        columns["T"] = history.temperature
     for kind, values in (("eps", history.eps), ("sig", history.sig)):
         columns |= {f"{kind}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
     mean = history.sig[:, :3].sum(axis=1) / 3.0
@@ -153,6 +162,8 @@ def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]
         "q": np.sqrt(1.5) * size * np.linalg.norm(deviator / np.where(size > 0.0, size, 1.0)[:, None], axis=1),
     }
     ends = {"psi": history.psi, "dissipation": history.dissipation, "status": history.status}
+    if history.entropy is not None:
+        ends = {"entropy": history.entropy, **ends}
     for name, values in history.state.items():
         if values.ndim == 2:
             columns |= {f"{name}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}

@@ -10,11 +10,11 @@ from __future__ import annotations
 import math
 
 from ..cache import njit
-from .key import rooms_hash
+from .key import kernels_hash
 
 __all__ = ["add_positive_derivative", "norm6", "positive_part"]
 
-_FOLDER = rooms_hash()
+_FOLDER = kernels_hash()
 
 
 @njit(folder=_FOLDER, inline="never")
@@ -131,37 +131,49 @@ def positive_part(t, eigen_, out):
 
 
 @njit(folder=_FOLDER)
-def add_positive_derivative(weight, eigen_, dyads, tangent):
-    """Add weight · D[·]^≥ to `tangent` (6×6): Θ_ij = (⟨e_i⟩−⟨e_j⟩)/(e_i−e_j), and H(e_i) for equal values; `dyads` is work space."""
+def add_positive_derivative(weight, eigen_, tangent):
+    """Add weight · D[·]^≥ to `tangent`, a row of 36: Θ_ij = (⟨e_i⟩−⟨e_j⟩)/(e_i−e_j), and H(e_i) for equal values.
+
+    With all but one eigenvalue positive the complement is summed, 𝕀 minus the derivative of the negative part: three dyads at most.
+    """
     count = 0
     for k in range(3):
         if eigen_[k] > 0.0:
             count += 1
     if count == 0:
         return
-    if count == 3:
+    if count >= 2:
         for i in range(6):
-            tangent[i, i] += weight
-        return
-    root = 1.4142135623730951
-    for k in range(6):
-        if k < 3:
-            l = m = k
-            theta = 1.0 if eigen_[k] > 0.0 else 0.0
-            factor = 1.0
-        else:
-            l, m = (k - 2) % 3, (k - 1) % 3
-            high, low = max(eigen_[l], eigen_[m]), min(eigen_[l], eigen_[m])
-            theta = 0.0 if high <= 0.0 else (1.0 if low > 0.0 else high / (high - low))
-            factor = root
-        if theta == 0.0:
-            continue
-        x, y, z = eigen_[3 + l], eigen_[6 + l], eigen_[9 + l]
+            tangent[7 * i] += weight
+        if count == 3:
+            return
+    # the eigenvalue that stands alone with its sign
+    l = 0
+    for k in range(3):
+        if (eigen_[k] > 0.0) == (count == 1):
+            l = k
+    sign = weight if count == 1 else -weight
+    x, y, z = eigen_[3 + l], eigen_[6 + l], eigen_[9 + l]
+    for k in range(3):
+        m = (l + k) % 3
         p, q, r = eigen_[3 + m], eigen_[6 + m], eigen_[9 + m]
-        dyads[0], dyads[1], dyads[2] = factor * x * p, factor * y * q, factor * z * r
-        half = factor / root
-        dyads[3], dyads[4], dyads[5] = half * (y * r + z * q), half * (x * r + z * p), half * (x * q + y * p)
+        if k == 0:
+            part, first, second = sign, 1.0, 1.4142135623730951
+        else:
+            part = sign * (eigen_[l] / (eigen_[l] - eigen_[m]))
+            first, second = 1.4142135623730951, 1.0
+        if part == 0.0:
+            continue
+        half = 0.5 * second if k == 0 else second
+        d0, d1, d2 = first * x * p, first * y * q, first * z * r
+        d3, d4, d5 = half * (y * r + z * q), half * (x * r + z * p), half * (x * q + y * p)
         for i in range(6):
-            part = weight * theta * dyads[i]
-            for j in range(6):
-                tangent[i, j] += part * dyads[j]
+            factor = part * (
+                d0 if i == 0 else d1 if i == 1 else d2 if i == 2 else d3 if i == 3 else d4 if i == 4 else d5
+            )
+            tangent[6 * i] += factor * d0
+            tangent[6 * i + 1] += factor * d1
+            tangent[6 * i + 2] += factor * d2
+            tangent[6 * i + 3] += factor * d3
+            tangent[6 * i + 4] += factor * d4
+            tangent[6 * i + 5] += factor * d5

@@ -1,19 +1,10 @@
-"""Find the structure of a law's implicit step (detection reads the derived operators, never names).
+"""The parts of a free energy that the implicit step needs, sorted by what they do to it (detection reads derived operators, never names).
 
-A law has the cone structure if
+    ρψ = ½ (ε, X):ℍ:(ε, X) + linear terms + ψ_s(s) + ψ_0(ε) + terms in T alone,
 
-* the blocks ∂²ψ/∂X_k∂X_l of the internal tensors, and ∂²ψ/∂ε∂X_k, are isotropic pairs (c₀, c₁) of parameters, the block of the
-  internal scalars is constant, and tensors and scalars do not couple;
-* φ* is the indicator of one f = a ‖dev Σ a_k A_k‖ + Σ b_k tr A_k + Σ r_j R_j − k, affine in one deviator norm, in traces and
-  in scalar forces.
-
-Deviatoric and spherical parts are orthogonal in an isotropic metric, so that the projection of the trial forces on {f ≤ 0} is the
-projection of three numbers, q = ‖dev Σ a_k A_k‖, Σ b_k tr A_k and Σ r_j R_j, with the weights
-
-    w_q = Σ a_k a_l c₀,   w_T = 3 Σ b_k b_l (c₀ + 3c₁),   w_R = Σ r_i r_j H_ij,
-    g_q = −Σ a_k c₀(ε, k),   g_T = −Σ b_k (c₀ + 3c₁)(ε, k).
-
-The rest of the energy, a function of ε alone, may be anything with a gradient and a generalised Hessian.
+ℍ blocks of constant isotropic pairs (c₀, c₁): c₀ 𝕀 + c₁ I⊗I in the tensors, ψ_s any function of the internal scalars, ψ_0 what is not
+quadratic and depends on the strain alone: it may be anything with a gradient and a generalised Hessian. "Constant" means parameters
+and the temperature, which is given during a step.
 """
 
 from __future__ import annotations
@@ -21,53 +12,58 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Dummy, Expr, S
+from sympy import Add, Expr, S, expand
 
 from ..errors import DeclarationError
 from ..potentials import Law
-from ..potentials.derivative import Operator, invariants_of, is_constant, partial, second_derivative
-from ..potentials.invariants import NormLeaf, TraceLeaf
-from ..potentials.scalars import ScalarVariable
-from ..potentials.tensor import Deviator, SymmetricTensor, TensorSymbol
+from ..potentials.atoms.positive_part import PositivePart
+from ..potentials.atoms.positive_square import PositiveSquareLeaf
+from ..potentials.atoms.trace import TraceLeaf
+from ..potentials.derivative import invariants_of, partial, second_derivative, variables_of
+from ..potentials.scalars import ScalarVariable, Temperature
+from ..potentials.tensor import TensorSymbol, identity
 
-__all__ = [
-    "ConeStructure",
-    "Moduli",
-    "NoConeStructure",
-    "find_cone",
-    "find_moduli",
-    "internal_scalars",
-    "internal_tensors",
-]
+__all__ = ["Moduli", "NoReduction", "find_moduli", "internal_scalars", "internal_tensors", "is_data", "state_layout"]
+
+Pair = tuple[Expr, Expr]
 
 
-class NoConeStructure(DeclarationError):
-    """The step has no closed form in (q, m, R); the text says why."""
+class NoReduction(DeclarationError):
+    """The step is not a projection of a few numbers; the text says why."""
 
 
 @dataclass(frozen=True)
 class Moduli:
-    """Blocks of D²ψ: ε–ε, ε–X_k, X_k–X_l (operators) and s_i–s_j (scalars)."""
+    """Pairs (c₀, c₁) of D²ψ between ε and X_k; `stress_0`, `force_0` the multiples of I in σ and A_k at zero state; scalars by `slopes`
+    R_j = −∂ψ_s/∂s_j and `scalar_block` ∂²ψ_s/∂s_i∂s_j; `traces` (w, a, s) of w⟨a tr ε + s⟩² and `spectral` (w, a, s) of
+    w tr⟨a ε + s I⟩² if ψ_0 is made of such, else `rest` is ψ_0."""
 
-    strain: Operator
-    mixed: tuple[Operator, ...]
-    tensors: tuple[tuple[Operator, ...], ...]
-    scalars: tuple[tuple[Expr, ...], ...]
+    strain: Pair
+    mixed: tuple[Pair, ...]
+    tensors: tuple[tuple[Pair, ...], ...]
+    stress_0: Expr
+    force_0: tuple[Expr, ...]
+    slopes: tuple[Expr, ...]
+    scalar_block: tuple[tuple[Expr, ...], ...]
+    scalar_energy: Expr
+    traces: tuple[tuple[Expr, Expr, Expr], ...]
+    spectral: tuple[tuple[Expr, Expr, Expr], ...]
+    rest: Expr
+
+    @property
+    def alone(self) -> bool:
+        """True if there is an energy ψ_0 of the strain alone."""
+        return bool(self.traces or self.spectral or self.rest != 0)
+
+    @property
+    def quadratic(self) -> bool:
+        """True if ψ_s is quadratic."""
+        return all(is_data(e) for row in self.scalar_block for e in row)
 
 
-@dataclass(frozen=True)
-class ConeStructure:
-    """Coefficients of the step; every entry is an expression in parameters (names as in the module's docstring)."""
-
-    a: Expr
-    dev_weights: tuple[Expr, ...]
-    trace_weights: tuple[Expr, ...]
-    scalar_weights: tuple[Expr, ...]
-    w_q: Expr
-    w_t: Expr
-    w_r: Expr
-    g_q: Expr
-    g_t: Expr
+def is_data(expression: Any) -> bool:
+    """True if the expression holds parameters, the temperature and frozen state only."""
+    return all(isinstance(v, Temperature) for v in variables_of(expression))
 
 
 def internal_tensors(law: Law) -> tuple[TensorSymbol, ...]:
@@ -80,93 +76,124 @@ def internal_scalars(law: Law) -> tuple[ScalarVariable, ...]:
     return tuple(v for v in law.internal if isinstance(v, ScalarVariable))
 
 
+def state_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
+    """Place (start, length) of every internal variable in the packed state, as declared, and the total length."""
+    layout, start = {}, 0
+    for variable in law.internal:
+        length = 1 if isinstance(variable, ScalarVariable) else 6 if isinstance(variable, TensorSymbol) else 3
+        layout[variable.name] = (start, length)
+        start += length
+    return layout, start
+
+
 def find_moduli(law: Law) -> Moduli:
-    """Blocks of the second derivative of ψ; refuses couplings that the step does not know."""
+    """Sorted parts of ψ; `NoReduction` names the coupling that a reduced step does not know."""
+    quadratic, alone = _split(law)
     tensors, scalars = internal_tensors(law), internal_scalars(law)
-    mixed = tuple(second_derivative(law.energy, law.observable, x) for x in tensors)
-    blocks = tuple(tuple(second_derivative(law.energy, x, y) for y in tensors) for x in tensors)
-    for name, operator in [
-        *((f"{law.observable}–{x}", o) for x, o in zip(tensors, mixed, strict=True)),
-        *((f"{x}–{y}", o) for x, row in zip(tensors, blocks, strict=True) for y, o in zip(tensors, row, strict=True)),
-    ]:
-        if not (operator.is_isotropic and is_constant(operator.c0) and is_constant(operator.c1)):
-            raise NoConeStructure(
-                f"law '{law.name}': the block {name} of the second derivative of psi is not constant and isotropic"
-            )
-    slopes = [partial(law.energy, s) for s in scalars]
-    rows = tuple(tuple(slope.diff(s) for s in scalars) for slope in slopes)  # type: ignore[union-attr]
-    for s, slope, row in zip(scalars, slopes, rows, strict=True):
-        assert isinstance(slope, Expr)
-        if invariants_of(slope):
-            raise NoConeStructure(f"law '{law.name}': psi couples the scalar '{s}' with a tensor")
-        if not all(is_constant(entry) for entry in row):
-            raise NoConeStructure(f"law '{law.name}': psi is not quadratic in the scalar '{s}'")
-    return Moduli(second_derivative(law.energy, law.observable, law.observable), mixed, blocks, rows)
 
-
-def find_cone(law: Law, moduli: Moduli) -> ConeStructure:
-    """Coefficients of the closed form, or `NoConeStructure` with the reason."""
-    law.check_evolution()
-    if len(law.surfaces) != 1:
-        raise NoConeStructure(f"law '{law.name}': phi_star has {len(law.surfaces)} surfaces; the closed form takes one")
-    tensors, scalars = internal_tensors(law), internal_scalars(law)
-    function = law.surfaces[0]
-    leaves = invariants_of(function)
-    dummies = [Dummy(f"l{i}", real=True) for i in range(len(leaves))]
-    opened: Any = function.xreplace(dict(zip(leaves, dummies, strict=True)))
-    dev_weights: list[Expr] = [S.Zero] * len(tensors)
-    trace_weights: list[Expr] = [S.Zero] * len(tensors)
-    a: Expr = S.Zero
-    for dummy, leaf in zip(dummies, leaves, strict=True):
-        slope = opened.diff(dummy)
-        if slope.atoms(Dummy) or not is_constant(slope):
-            raise NoConeStructure(f"law '{law.name}': phi_star is not affine in {leaf}")
-        weights = _force_weights(law, leaf.args[0], tensors, deviatoric=isinstance(leaf, NormLeaf))  # type: ignore[arg-type]
-        if isinstance(leaf, TraceLeaf):
-            trace_weights = [old + slope * w for old, w in zip(trace_weights, weights, strict=True)]
-        elif isinstance(leaf, NormLeaf):
-            if a != 0:
-                raise NoConeStructure(
-                    f"law '{law.name}': phi_star holds two different norms; the closed form takes one"
-                )
-            dev_weights, a = weights, slope
-        else:
-            raise NoConeStructure(
-                f"law '{law.name}': phi_star holds {leaf}; the closed form takes norm(dev(...)) and tr(...)"
+    def pair(x: TensorSymbol, y: TensorSymbol) -> Pair:
+        operator = second_derivative(quadratic, x, y)
+        if not operator.is_isotropic or not is_data(operator.c0) or not is_data(operator.c1):
+            raise NoReduction(
+                f"law '{law.name}': the block {x}–{y} of the second derivative of psi is not constant and isotropic"
             )
-    scalar_weights = []
+        return operator.c0, operator.c1
+
+    blocks: dict[tuple[int, int], Pair] = {}
+    for k, x in enumerate(tensors):
+        for l, y in enumerate(tensors[: k + 1]):
+            blocks[k, l] = blocks[l, k] = pair(x, y)
+    slopes = []
     for s in scalars:
-        slope = opened.diff(law.forces[s]) if s in law.forces else S.Zero
-        if slope.atoms(Dummy) or not is_constant(slope):
-            raise NoConeStructure(f"law '{law.name}': phi_star is not affine in the force of '{s}'")
-        scalar_weights.append(slope)
-    return _weights(moduli, a, dev_weights, trace_weights, scalar_weights)
+        slope = -partial(quadratic, s)
+        if invariants_of(slope):
+            raise NoReduction(f"law '{law.name}': psi couples the scalar '{s}' with a tensor")
+        slopes.append(slope)
+    n = range(len(tensors))
+    traces, spectral, rest = _unilateral(law, alone)
+    return Moduli(
+        pair(law.observable, law.observable),
+        tuple(pair(law.observable, x) for x in tensors),
+        tuple(tuple(blocks[k, l] for l in n) for k in n),
+        _sphere_at_zero(law, quadratic, law.observable),
+        tuple(-_sphere_at_zero(law, quadratic, x) for x in tensors),
+        tuple(slopes),
+        tuple(tuple(-slope.diff(s) for s in scalars) for slope in slopes),
+        Add(*(t for t in Add.make_args(quadratic) if t.atoms(ScalarVariable) & set(scalars))),
+        traces,
+        spectral,
+        rest,
+    )
 
 
-def _force_weights(
-    law: Law, tensor: SymmetricTensor, tensors: tuple[TensorSymbol, ...], deviatoric: bool
-) -> list[Expr]:
-    weights: list[Expr] = [S.Zero] * len(tensors)
-    place = {law.forces[x]: k for k, x in enumerate(tensors) if x in law.forces}
-    for atom, coefficient in tensor.terms().items():
-        base = atom.args[0] if isinstance(atom, Deviator) else atom
-        if base not in place or (deviatoric and not isinstance(atom, Deviator)):
-            raise NoConeStructure(
-                f"law '{law.name}': phi_star holds {tensor} inside a norm or trace; write norm(dev(...)) of forces"
-            )
-        weights[place[base]] += coefficient  # type: ignore[index]
-    return weights
+def _split(law: Law) -> tuple[Expr, list[Expr]]:
+    """Terms of ψ that the blocks describe, and the others, which depend on ε alone."""
+    energy = law.energy
+    if energy.is_Mul:
+        energy = expand(energy, deep=False)
+    quadratic, alone = [], []
+    for term in Add.make_args(energy):
+        variables = {v for v in variables_of(term) if not isinstance(v, Temperature)}
+        if variables == {law.observable}:
+            operator = second_derivative(term, law.observable, law.observable)
+            if not (operator.is_isotropic and is_data(operator.c0) and is_data(operator.c1)):
+                alone.append(term)
+                continue
+        quadratic.append(term)
+    return Add(*quadratic), alone
 
 
-def _weights(moduli: Moduli, a: Expr, dev_w: list[Expr], trace_w: list[Expr], scalar_w: list[Expr]) -> ConeStructure:
-    def mean(o: Operator) -> Expr:
-        return o.c0 + 3 * o.c1
+def _sphere_at_zero(law: Law, energy: Expr, tensor: TensorSymbol) -> Expr:
+    """Multiple of I in ∂ψ/∂X where all variables are zero."""
+    found: Expr = S.Zero
+    for atom, coefficient in partial(energy, tensor).terms().items():
+        value: Any = coefficient.xreplace(dict.fromkeys(invariants_of(coefficient), S.Zero))
+        if atom == identity:
+            found = found + value
+        if not is_data(value):
+            raise NoReduction(f"law '{law.name}': psi couples '{tensor}' with a scalar variable")
+    return found
 
-    pairs = [(k, l) for k in range(len(dev_w)) for l in range(len(dev_w))]
-    w_q = sum((dev_w[k] * dev_w[l] * moduli.tensors[k][l].c0 for k, l in pairs), S.Zero)
-    w_t = 3 * sum((trace_w[k] * trace_w[l] * mean(moduli.tensors[k][l]) for k, l in pairs), S.Zero)
-    n = range(len(scalar_w))
-    w_r = sum((scalar_w[i] * scalar_w[j] * moduli.scalars[i][j] for i in n for j in n), S.Zero)
-    g_q = -sum((w * o.c0 for w, o in zip(dev_w, moduli.mixed, strict=True)), S.Zero)
-    g_t = -sum((w * mean(o) for w, o in zip(trace_w, moduli.mixed, strict=True)), S.Zero)
-    return ConeStructure(a, tuple(dev_w), tuple(trace_w), tuple(scalar_w), w_q, w_t, w_r, g_q, g_t)
+
+def _unilateral(law: Law, terms: list[Expr]) -> tuple[Any, Any, Expr]:
+    traces, spectral, rest = [], [], []
+    for term in terms:
+        found = _square_of_trace(law, term)
+        if found is not None:
+            traces.append(found)
+            continue
+        leaves = invariants_of(term)
+        weight = term / leaves[0] if len(leaves) == 1 else term
+        shape = _scaled_strain(law, leaves[0].args[0]) if len(leaves) == 1 else None
+        if shape is not None and isinstance(leaves[0], PositiveSquareLeaf) and is_data(weight):
+            spectral.append((weight, *shape))
+        else:
+            rest.append(term)
+    if rest:
+        return (), (), Add(*terms)  # one generated function takes them all
+    return tuple(traces), tuple(spectral), S.Zero
+
+
+def _square_of_trace(law: Law, term: Expr) -> tuple[Expr, Expr, Expr] | None:
+    """(w, a, s) of w⟨a tr ε + s⟩²."""
+    parts = sorted(term.atoms(PositivePart), key=str)
+    if len(parts) != 1 or not is_data(term / parts[0] ** 2):
+        return None
+    leaf = TraceLeaf(law.observable)
+    body: Any = expand(parts[0].args[0])
+    weight: Expr = S.Zero
+    for summand in Add.make_args(body):
+        if summand.has(TraceLeaf):
+            if not is_data(summand / leaf):
+                return None
+            weight = weight + summand / leaf
+    shift = expand(body - weight * leaf)
+    return (term / parts[0] ** 2, weight, shift) if is_data(shift) else None
+
+
+def _scaled_strain(law: Law, tensor: Any) -> tuple[Expr, Expr] | None:
+    """(a, s) of a ε + s I."""
+    terms = tensor.terms() if hasattr(tensor, "terms") else {}
+    if not terms or set(terms) - {law.observable, identity} or not all(is_data(c) for c in terms.values()):
+        return None
+    return terms.get(law.observable, S.Zero), terms.get(identity, S.Zero)

@@ -11,11 +11,12 @@ from typing import Any
 
 from sympy import Expr, S, Symbol
 
-from ..errors import DeclarationError
+from ..potentials.atoms.atom import Invariant
 from ..potentials.derivative import invariants_of, is_constant
-from ..potentials.invariants import InnerLeaf, Invariant, NormLeaf, PositiveSquareLeaf, TraceLeaf
+from ..potentials.invariants import InnerLeaf, NormLeaf, PositiveSquareLeaf, TraceLeaf
 from ..potentials.printer import number_code
 from ..potentials.tensor import Deviator, IdentityTensor, PositiveTensor, SymmetricTensor, TensorSymbol
+from .structure import NoReduction
 
 __all__ = ["Writer"]
 
@@ -99,7 +100,7 @@ class Writer:
         if isinstance(atom, PositiveTensor):
             return f"positive{self.spectrum(atom.args[0])}_[i_]"  # type: ignore[arg-type]
         if not isinstance(atom, TensorSymbol):
-            raise DeclarationError(f"no component code for {atom}")
+            raise NoReduction(f"no component code is written for {atom}")
         return f"{atom.name}[i_]"
 
     def trace(self, tensor: SymmetricTensor) -> str:
@@ -133,7 +134,8 @@ class Writer:
         if leaf in self.leaves:
             return self.leaves[leaf]
         first = leaf.args[0]
-        assert isinstance(first, SymmetricTensor)
+        if not isinstance(first, SymmetricTensor):
+            raise NoReduction(f"no code is written for {leaf}")
         if isinstance(leaf, PositiveSquareLeaf):
             return self.leaves.setdefault(leaf, Symbol(f"square{self.spectrum(first)}_"))
         if isinstance(leaf, TraceLeaf):
@@ -147,7 +149,8 @@ class Writer:
             symbol = self.leaves.setdefault(leaf, Symbol(f"x{len(self.leaves)}_"))
             self.line(f"{symbol} = norm6(work_[0])")
             return symbol
-        assert isinstance(leaf, InnerLeaf)
+        if not isinstance(leaf, InnerLeaf):
+            raise NoReduction(f"no code is written for {leaf}")
         second = leaf.args[1]
         assert isinstance(second, SymmetricTensor)
         self.tensor_into("work_[0]", first)

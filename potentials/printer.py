@@ -9,14 +9,14 @@ from sympy.printing.pycode import PythonCodePrinter
 
 from ..errors import DeclarationError
 
-__all__ = ["number_code"]
+__all__ = ["NumberPrinter", "number_code"]
 
 _KNOWN = frozenset(
     ("exp log sin cos tan asin acos atan sinh cosh tanh sqrt Abs PositivePart Step").split()  # noqa: SIM905
 )
 
 
-class _NumberPrinter(PythonCodePrinter):
+class NumberPrinter(PythonCodePrinter):
     def __init__(self) -> None:
         super().__init__({"fully_qualified_modules": True, "allow_unknown_functions": False})
 
@@ -60,6 +60,6 @@ def number_code(expression: Expr) -> str:
         if function.is_number and not function.is_finite:
             raise DeclarationError(f"the expression {expression} holds {function}")
     try:
-        return str(_NumberPrinter().doprint(expression))
+        return str(NumberPrinter().doprint(expression))
     except Exception as error:
         raise DeclarationError(f"no code can be written for {expression}: {str(error).splitlines()[0]}") from None

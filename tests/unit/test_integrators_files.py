@@ -28,7 +28,7 @@ SAND = dict(E_s=12e6, nu_s=0.2, theta_f=0.079, C_0=2842.0, H_k=944e3, H_i=472e3)
         ("t,eps_zz\n0,0\n0,1\n", "row 3, column 't': the time must increase"),
         ("t,eps_v,p\n0,0,0\n", "both 'eps_v' and 'p'"),
         ("t,eps_xx,eps_yy,eps_zz,eps_v\n0,0,0,0,0\n", "replaces a normal component"),
-        ("t,T\n0,300\n", "no temperature"),
+        ("t,T\n0,-3\n", "in kelvin"),
     ],
 )
 def test_wrong_path_files_are_refused_in_one_line(tmp_path, text, words):
