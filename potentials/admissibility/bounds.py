@@ -103,6 +103,8 @@ def _up(x: float) -> float:
 
 
 def _number(value: Any) -> Interval:
+    if not (value.is_finite and value.is_real):
+        return EVERYWHERE
     number = float(value)
     exact = isinstance(value, Integer) or (isinstance(value, Rational) and value.q & (value.q - 1) == 0)
     return (number, number) if exact else (_down(number), _up(number))

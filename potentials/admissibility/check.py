@@ -125,6 +125,10 @@ class _Check:
             for condition in failed:
                 self._soften(condition)
         exact = {p: Rational(repr(v)) for p, v in self.values.items()}
+        infinite = next((c for c in failed if _is_nan(c.value(self.values))), None)
+        if infinite is not None:
+            self.reasons.append(f"{head}: refuted, {infinite} is not finite for the values given")
+            return False
         if exact:
             again = question.prove(exact)
             if again is not None and not self._decided(question, again):
@@ -168,15 +172,13 @@ class _Check:
                 break
         for condition in failed:
             value = condition.value(self.values)
-            if value is not None and value[0] != value[0]:
-                self.reasons.append(f"{head}: refuted, {condition} is not finite for the values given")
-                return False
             self.reasons.append(
                 f"{question.potential}: {condition} fails" + ("" if value is None else f": {value[0]:g}")
             )
         if None not in found:
+            first = self.example is None
             self.example = self.example or found[0]
-            self.reasons.append(f"{head}: refuted, {found[0]}")
+            self.reasons.append(f"{head}: refuted" + (" by the counter-example" if first else f", {found[0]}"))
             self._name_softening(question)
             return False
         first = next((f for f in found if f is not None), None)
@@ -193,6 +195,8 @@ class _Check:
         """Without values: which parameters enter the negative modulus of internal variables alone."""
         if question.potential != "psi" or self.example is None or self.softening or self.law.psi is None:
             return
+        if len(self.example.points) != 3:
+            return
         first, second = self.example.points[:2]
         moved = [n for n in first if first[n] != second[n]]
         internal = {v.name: v for v in self.law.internal}
@@ -207,6 +211,10 @@ class _Check:
                 f"softening: psi bends downwards in {', '.join(moved)} alone"
                 + (f"; the modulus is made of {', '.join(names)}" if names else "")
             )
+
+
+def _is_nan(found: tuple[float, float] | None) -> bool:
+    return found is not None and found[0] != found[0]
 
 
 def _terms(expression: Any) -> Any:

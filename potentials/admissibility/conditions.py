@@ -62,8 +62,12 @@ class Condition(str):
     def value(self, values: Mapping[Any, float]) -> tuple[float, float] | None:
         """(value, size of its largest part), or None while a symbol in it has no value. NaN where it is not defined."""
         expression: Any = self.expression
-        if self.on_state or any(s not in values for s in self.symbols):
+        if self.on_state:
             return None
+        if any(s not in values for s in self.symbols):
+            bottom = fraction(expression)[1]
+            known = not bottom.is_number and bottom.free_symbols <= set(values)
+            return (math.nan, 1.0) if known and interval(bottom, lambda s: (values[s],) * 2) == (0.0, 0.0) else None
         # not by `evaluate`, which takes 1/0 for an element of a subdifferential
         ends = [interval(part, lambda s: (values[s], values[s])) for part in Add.make_args(expression)]
         parts = [0.5 * (low + high) for low, high in ends]

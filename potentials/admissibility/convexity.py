@@ -19,9 +19,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Expr, Lambda, Mul, Pow
+from sympy import Add, Expr, Lambda, Mul, Pow, S
 
 from ..atoms import ATOMS, atom_of
+from ..atoms.maximum import Maximum
 from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import interval, natural_range, sharp_interval
@@ -191,7 +192,7 @@ class Prover:
     def _curved(self, expression: Any, goal: int) -> Proof | None:
         if self.constant(expression):
             return Proof()
-        terms = [t for t in self.terms(expression) if not self.constant(t)]
+        terms = self._gathered(expression)
         low: list[Any] = []
         rest: list[Any] = []
         for term in terms:
@@ -207,6 +208,15 @@ class Prover:
             word = "convex" if goal > 0 else "concave"
             proof = proof.step(f"a sum of {word} terms is {word}")
         return proof
+
+    def _gathered(self, expression: Any) -> list[Any]:
+        """Terms that are not data, those alike with one weight."""
+        weights: dict[Any, Any] = {}
+        for term in self.terms(expression):
+            weight, rest = self.split(term)
+            if rest != 1:
+                weights[rest] = weights.get(rest, S.Zero) + weight
+        return [weight * rest for rest, weight in weights.items() if weight != 0]
 
     def _apart(self, terms: list[Any], goal: int) -> Proof | None:
         """Groups of terms without a common variable, each by itself; the last resort of one group are exact programs."""
@@ -280,6 +290,8 @@ class Prover:
         if node.is_Add:
             return self.curved(node, goal)
         if node.is_Mul:
+            node = _with_absolute(node)
+        if node.is_Mul:
             found = convex_quotient(self, node) if goal > 0 else None
             return found or convex_by_second_derivative(self, node, goal)
         if isinstance(node, Pow):
@@ -338,6 +350,19 @@ def one_variable(expression: Any, x: Any, require: Any) -> str:
                 require(need.expression)
             return word
     return "unknown"
+
+
+def _with_absolute(node: Any) -> Any:
+    """x² |x| as |x|³: sympy writes odd powers of |x| in the first way."""
+    factors = dict(part.as_base_exp() for part in node.args)
+    for base, exponent in list(factors.items()):
+        if not isinstance(base, Maximum) or base.args[0] != -base.args[1]:
+            continue
+        for x in base.args:
+            if x in factors and factors[x].is_even:
+                factors[base] = exponent + factors.pop(x)
+                return Mul(*(b**e for b, e in factors.items()))
+    return node
 
 
 def _about(node: Any) -> str:

@@ -34,6 +34,7 @@ class CounterExample:
             "violation": self.violation,
             "parameters": dict(self.parameters),
             "data": dict(self.data),
+            "text": str(self),
         }
 
     def __str__(self) -> str:

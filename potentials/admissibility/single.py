@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from sympy import Expr, Poly, PolynomialError, S, factor, log, simplify, together
+from sympy import Expr, Poly, PolynomialError, Pow, S, factor, log, simplify, together
 
 from ..atoms import ATOMS
 from ..atoms.atom import Invariant
@@ -44,6 +44,8 @@ def convex_by_second_derivative(prover: Prover, expression: Any, goal: int) -> P
     if second.has(Step):
         return None
     inner = Prover([stand_in])
+    if not _defined(inner, body):
+        return None
     proof = _not_negative(inner, second, stand_in, positive)
     if proof is None:
         return None
@@ -59,6 +61,19 @@ def convex_by_second_derivative(prover: Prover, expression: Any, goal: int) -> P
         proof = inside + proof + rising
         how = f"a convex function, rising from zero on, of {variable}, which is convex and not negative"
     return Proof(proof.needs, (*proof.steps, f"{expression} is {word}{where}: {how}"), domain)
+
+
+def _defined(prover: Prover, body: Any) -> bool:
+    """True if powers and logarithms in it are defined wherever its scalar may be."""
+    for node in body.atoms(Pow, log):
+        base = node.args[0]
+        whole = isinstance(node, Pow) and node.exp.is_integer
+        if prover.constant(base) or (whole and node.exp.is_nonnegative):
+            continue
+        root = isinstance(node, Pow) and not whole and prover.positive(node.exp) is not None
+        if (prover.nonnegative(base) if root else prover.positive(base)) is None:
+            return False
+    return True
 
 
 def _not_negative(prover: Prover, second: Any, x: Any, half_line: bool) -> Proof | None:

@@ -109,6 +109,8 @@ def _check(
 ) -> None:
     """Whether a law is admissible: exit code 0 if proved, 1 if refuted or undecided, 2 if it is not a valid declaration.
 
+    Without values the answer holds for all parameters that keep the conditions printed; values decide the conditions.
+
     Example: fenchel check von_mises -p E=2e11 -p nu=0.3
     """
     from fenchel.potentials import load_law
@@ -116,26 +118,9 @@ def _check(
     from .tables import print_json
 
     report = load_law(law).check(**parameter_values(pairs, parameters))
-    verdict = {True: "proved", False: "refuted", None: "undecided"}[report.admissible]
-    conditions = [str(item) for item in report.conditions]
-    reasons = [str(item) for item in report.reasons]
-    counterexample = getattr(report, "counterexample", None)
     if json_wanted:
-        print_json(
-            {
-                "admissible": report.admissible,
-                "verdict": verdict,
-                "conditions": conditions,
-                "reasons": reasons,
-                "counterexample": None if counterexample is None else str(counterexample),
-            }
-        )
+        print_json(report.as_dict())
     else:
-        typer.echo(f"{law}: {verdict}")
-        for head, lines in (("under the conditions", conditions), ("because", reasons)):
-            if lines:
-                typer.echo("\n".join([f"{head}:", *(f"  {line}" for line in lines)]))
-        if counterexample is not None:
-            typer.echo(f"counterexample: {counterexample}")
+        typer.echo(report.text())
     if report.admissible is not True:
         raise typer.Exit(1)
