@@ -15,6 +15,7 @@ all bounds and there are only approximate ones.
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass
 
 import numpy as np
@@ -34,7 +35,10 @@ Array = NDArray[np.float64]
 _KAPPA = 1.0
 _LONGEST = 0.7  # step along the curve, in the local norm of the worst contact
 _TIGHT = 0.2  # correction, in the same norm, up to which a point counts as on the curve
+_TIGHTEST = 0.002  # how far that bound is lowered where the curve turns sharply
 _LOOSE = 0.6  # correction up to which it may be brought there; beyond, the step is repeated at half its length
+_SHORTEST = 1e-4  # step below which the curve counts as lost
+_TRAIL, _CALM = 10, 40  # points kept to go back to; points after which the bound is relaxed again
 
 
 @dataclass
@@ -161,10 +165,10 @@ def _expand(curve: _Curve, at: _Point) -> tuple[_Expansion, float]:
 def solve_homotopy(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, start: float = 1.0) -> None:
     """Follow the curve from a cold start, polishing by Newton's method once per decade of τ below 1e-6; `limit` counts factorisations."""
     curve = _Curve(blocks, start)
-    at: _Point | None = curve.point(curve.first.x, curve.first.y, 1.0)
-    base: _Expansion | None = None
-    delta, forward, next_polish = 0.5, 0, 1e-6
-    corrections, share, before = 0, 1.0, np.inf
+    at = curve.point(curve.first.x, curve.first.y, 1.0)
+    trail: deque[_Expansion] = deque(maxlen=_TRAIL)
+    delta, tight, forward, next_polish = 0.5, _TIGHT, 0, 1e-6
+    corrections, before, calm = 0, np.inf, 0
     for _ in range(limit):
         if at is None or monitor.out_of_time:
             return
@@ -174,16 +178,18 @@ def solve_homotopy(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, 
             fresh, length = _expand(curve, at)
         except np.linalg.LinAlgError:
             fresh, length = None, np.inf
-        if fresh is not None and (base is None or length <= _TIGHT):
+        if fresh is not None and (not trail or length <= tight):
             sign = curve.system.sign()
             forward = forward or sign
             fresh.side = -1.0 if sign == forward else 1.0
-            if base is not None:
-                delta = min(
-                    _LONGEST,
-                    delta * (2.0 if corrections == 0 and length < 0.5 * _TIGHT else 1.2 if corrections < 2 else 0.7),
-                )
-            base, corrections, share, before = fresh, 0, 1.0, np.inf
+            if trail:
+                easy = corrections == 0 and length < 0.5 * tight
+                delta = min(_LONGEST, delta * (2.0 if easy else 1.2 if corrections < 2 else 0.7))
+            calm += 1
+            if calm > _CALM and tight < _TIGHT:
+                tight, calm = min(_TIGHT, 4.0 * tight), 0
+            trail.append(fresh)
+            corrections, before = 0, np.inf
             if monitor(unfold(at.x, blocks.mu)):
                 return
             if at.tau < next_polish and fresh.side < 0.0:
@@ -191,21 +197,25 @@ def solve_homotopy(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, 
                 polish(blocks, monitor, limit=25, start=unfold(at.x, blocks.mu))
                 if monitor.converged:
                     return
-            at = _advance(curve, base, delta, share)
+            at = _advance(curve, fresh, delta)
         elif fresh is not None and length <= min(_LOOSE, 0.7 * before) and corrections < 4:
             corrections, before = corrections + 1, length
             at = _advance(curve, fresh, 0.0, min(1.0, 0.3 / length))
         else:
             at = None
-        while at is None:
-            # back to the last point on the curve, with a shorter step and, from then on, less trust in its own correction
+        while at is None and trail:
             delta, corrections, before = 0.5 * delta, 0, np.inf
-            if base is None or delta < 1e-8:
-                return
-            share = 1.0 if delta > 1e-2 else 0.3
-            at = _advance(curve, base, delta, share)
+            if delta < _SHORTEST:
+                # the last points have left the curve without a word: go back some way, and keep closer to it from there
+                if tight <= _TIGHTEST:
+                    return
+                tight, calm, delta = 0.25 * tight, 0, 0.1
+                back = trail[0]
+                trail.clear()
+                trail.append(back)
+            at = _advance(curve, trail[-1], delta)
 
 
-def _advance(curve: _Curve, base: _Expansion, delta: float, share: float) -> _Point | None:
+def _advance(curve: _Curve, base: _Expansion, delta: float, share: float = 1.0) -> _Point | None:
     at = curve.point(*base.ahead(delta, share))
     return at if at is not None and curve.near(at) else None

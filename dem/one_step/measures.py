@@ -51,7 +51,7 @@ def onto_cone(r: Array, mu: Array) -> Array:
     normal, size = blocks[:, 0], np.hypot(blocks[:, 1], blocks[:, 2])
     out = blocks.copy()
     along = (normal + mu * size) / (1.0 + mu * mu)  # of the foot on the generator
-    outside = size > mu * normal
+    outside = (size > mu * normal) | (normal < 0.0)
     polar = outside & (along <= 0.0)
     side = outside & ~polar
     out[polar] = 0.0
