@@ -205,9 +205,14 @@ def run_scene(
 
 
 def finished_test(assembly: Assembly, stage: Stage, seed: int) -> dict[str, Any]:
-    """Content of the run file of a finished test: the record and the last state."""
+    """Content of the run file of a finished test: the record, the last state and the code that was generated."""
     assert isinstance(stage, TriaxialTest)
-    return {"record": record_content(stage.record(seed=seed, settings={})), "assembly": assembly.arrays()}
+    kernels = stage.simulation.kernels.report()
+    return {
+        "record": record_content(stage.record(seed=seed, settings={})),
+        "assembly": assembly.arrays(),
+        "kernels": kernels,
+    }
 
 
 def triaxial_stage(

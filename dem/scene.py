@@ -30,8 +30,12 @@ __all__ = [
 Name = Literal["rigid_rod", "elastic_rod", "rigid_wire", "elastic_wire"]
 
 
-def _key(text: str, unit: str, **bounds: Any) -> Meta:
+def key_meta(text: str, unit: str, **bounds: Any) -> Meta:
+    """What a key means, its unit and its bounds."""
     return Meta(description=text, extra_json_schema={"unit": unit}, **bounds)
+
+
+_key = key_meta
 
 
 class Grains(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
@@ -155,20 +159,25 @@ def parse_toml(data: bytes, kind: type[Kind], name: str) -> Kind:
 
 def _fields_at(kind: Any, key: str) -> list[str]:
     """Names of the keys allowed at a dotted place of a struct type."""
-    info = msgspec.inspect.type_info(kind)
+    info = _bare(msgspec.inspect.type_info(kind))
     for part in [] if key == "top level" else key.split("."):
         if isinstance(info, msgspec.inspect.StructType):
-            info = next((_bare(f.type) for f in info.fields if f.encode_name == part), info)
-    info = _bare(info)
+            info = next((_inner(f.type, part) for f in info.fields if f.encode_name == part.partition("[")[0]), info)
     return [f.encode_name for f in info.fields] if isinstance(info, msgspec.inspect.StructType) else []
 
 
 def _values_at(kind: Any, key: str) -> list[str]:
     """The words allowed at a dotted place of a struct type."""
-    info = msgspec.inspect.type_info(kind)
+    info = _bare(msgspec.inspect.type_info(kind))
     for part in key.split("."):
-        info = _bare(next(f.type for f in _bare(info).fields if f.encode_name == part))
+        info = next(_inner(f.type, part) for f in info.fields if f.encode_name == part.partition("[")[0])
     return [str(value) for value in getattr(info, "values", ())]
+
+
+def _inner(info: Any, part: str) -> Any:
+    """The type at a key, or that of the items where the key counts them (`plane[0]`)."""
+    info = _bare(info)
+    return _bare(info.item_type) if "[" in part and hasattr(info, "item_type") else info
 
 
 def _bare(info: Any) -> Any:
@@ -184,9 +193,9 @@ def check_finite(struct: msgspec.Struct, name: str, at: str = "") -> None:
     for field in struct.__struct_fields__:
         value = getattr(struct, field)
         key = f"{at}{field}"
-        for item in value if isinstance(value, tuple) else (value,):
+        for place, item in enumerate(value if isinstance(value, tuple) else (value,)):
             if isinstance(item, msgspec.Struct):
-                check_finite(item, name, f"{key}.")
+                check_finite(item, name, f"{key}[{place}]." if isinstance(value, tuple) else f"{key}.")
             elif isinstance(item, float) and not math.isfinite(item):
                 raise InputError(f"{name}: {key} = {item}: must be a finite number")
 

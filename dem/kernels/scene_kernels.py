@@ -321,6 +321,10 @@ class SceneKernels:
                 out[name] = 8 * (kernel.columns.total + kernel.cold + kernel.warm) + indices
         return out
 
+    def report(self) -> dict[str, Any]:
+        """Names of the generated modules and bytes of a row of each kind, as a run file holds them."""
+        return {"names": " ".join(kernel.name for kernel in self.all()), "bytes": self.bytes_per_contact()}
+
     def source(self) -> str:
         """The text of all generated modules, to read."""
         return "\n\n".join(f"# {kernel.name}\n{kernel.text}" for kernel in self.all())

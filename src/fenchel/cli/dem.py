@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
+from typing import Any
 
 import typer
 
@@ -33,7 +34,9 @@ def _dem(
     quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the quality of the run as JSON."),
 ) -> None:
-    """Make a sample of grains and wires, test it, and write its run file; the last table says how well it was solved.
+    """Make a sample of grains and wires, test it, and write its run file; the last tables say how well it was solved, and by which code.
+
+    A scene with a table [motion] instead of [triaxial] lets bodies move freely: grains, planes, floors, chains.
 
     With --resume a finished run is read again and not run again: a way to export it later.
 
@@ -41,11 +44,16 @@ def _dem(
     """
     from fenchel.dem import run_scene
     from fenchel.dem.export import export_run
+    from fenchel.dem.motion_scene import is_motion
+    from fenchel.dem.storage import load_run
     from fenchel.dem.triaxial import QUALITY
 
     from .progress import progress_bar
     from .tables import print_json, print_table
 
+    if is_motion(scene):
+        _motion(scene, output, resume, quiet, json_wanted, bool(export))
+        return
     with progress_bar(not quiet) as progress:
         record = run_scene(scene, output, resume=resume, progress=progress)
     exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
@@ -59,10 +67,43 @@ def _dem(
                 "frames": len(record.leg),
                 "quality": record.quality,
                 "exports": exported,
+                "kernels": load_run(output)[0].get("kernels", {}),
             }
         )
     else:
         rows = [(name, value, *QUALITY[name]) for name, value in record.quality.items()]
         print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
+        _print_kernels(load_run(output)[0].get("kernels", {}))
         for file in exported:
             typer.echo(f"exported {file}")
+
+
+def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: bool) -> None:
+    """Run a scene of free bodies."""
+    from fenchel.dem.motion import QUALITY, run_motion
+    from fenchel.errors import InputError
+
+    from .progress import progress_bar
+    from .tables import print_json, print_table
+
+    if export:
+        raise InputError("--export: is for tests in a box; the frames of a motion are in the run file")
+    with progress_bar(not quiet) as progress:
+        content = run_motion(scene, output, resume=resume, progress=progress)
+    frames, quality = content["frames"], content["quality"]
+    if json_wanted:
+        print_json({"run": output, "frames": len(frames["time"]), "quality": quality, "kernels": content["kernels"]})
+        return
+    rows = [(name, value, *QUALITY[name]) for name, value in quality.items()]
+    print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(frames['time'])} frames")
+    _print_kernels(content["kernels"])
+
+
+def _print_kernels(report: dict[str, Any]) -> None:
+    """The generated code of a scene and what a row costs in memory."""
+    from .tables import print_table
+
+    names = str(report.get("names", "")).split()
+    size = report.get("bytes", {})
+    rows = [(name, size.get(name.split("_")[2], "")) for name in names]
+    print_table(("generated code", "bytes a row"), rows)
