@@ -17,13 +17,13 @@ from ..atoms.maximum import Maximum
 from ..atoms.norm import NormLeaf
 from ..atoms.positive_part import PositivePart
 from ..atoms.positive_trace import PositiveTraceLeaf
-from ..atoms.trace import TraceLeaf
+from ..atoms.trace import TraceLeaf, tr
 from ..ranked import Ranked
 from ..scalars import Parameter
-from ..tensor import Deviator
-from .form import MinForm, substituted
+from ..tensor import Deviator, from_terms
+from .form import MinForm, is_zero, substituted
 from .quadratic import gathered, opened, tidy_scalar
-from .slots import Multiplier, mentions
+from .slots import FreeMultiplier, Multiplier, mentions
 
 __all__ = ["eliminated"]
 
@@ -31,12 +31,36 @@ __all__ = ["eliminated"]
 def eliminated(form: MinForm, duals: dict[Any, Any]) -> MinForm:
     """The same function with as few unknowns as the rules allow; shares that stay unknown keep their equality."""
     form = form.map(_clean)
+    form = replace(form, equalities=whole_tensors(form.equalities))
     trial = _solve_all(form, duals)
     ranked_left = [u for u in trial.unknowns if not isinstance(u, Multiplier)]
     if ranked_left:
         # shares that cannot be determined are kept as they were declared, with the equality between them
         return _solve_all(form, duals, shares=False)
-    return replace(trial, phases=(), inequalities=_independent(trial.inequalities))
+    return replace(
+        trial, phases=(), inequalities=_independent(trial.inequalities), equalities=whole_tensors(trial.equalities)
+    )
+
+
+def whole_tensors(equalities: tuple[Any, ...]) -> tuple[Any, ...]:
+    """dev T = 0 as T = 0 where the scalar equalities say that tr T = 0; the one that says it falls away."""
+    found = list(equalities)
+    for equality in equalities:
+        if not isinstance(equality, Ranked) or equality.rank != 2:
+            continue
+        if not all(isinstance(a, Deviator) for a in equality.terms()):
+            continue
+        whole = from_terms({a.args[0]: c for a, c in equality.terms().items()})  # type: ignore[misc]
+        trace = gathered(opened(tr(whole)))
+        scalars = [e for e in found if not isinstance(e, Ranked)]
+        combined = [(e, e) for e in scalars]
+        combined += [(e, s * e - f) for f in scalars for e in scalars if e is not f for s in (1, -1)]
+        for one, sum_of_two in combined:
+            ratio = S.Zero if is_zero(gathered(sum_of_two)) else tidy_scalar(gathered(sum_of_two) / trace)
+            if ratio != 0 and ratio.is_number:
+                found = [whole if e is equality else e for e in found if e is not one]
+                break
+    return tuple(found)
 
 
 def _independent(inequalities: tuple[Expr, ...]) -> tuple[Expr, ...]:
@@ -97,7 +121,7 @@ def _by_equality(form: MinForm, given: set[Any], shares: bool) -> MinForm | None
         return None
     _, k, unknown, weight, solution = min(candidates, key=lambda c: c[0])
     extra: tuple[Expr, ...] = ()
-    if isinstance(unknown, Multiplier) and not solution.is_nonnegative:
+    if isinstance(unknown, Multiplier) and not isinstance(unknown, FreeMultiplier) and not solution.is_nonnegative:
         extra = (-solution,)
     rest = replace(
         form,
@@ -149,7 +173,7 @@ def _has_duals(weight: Expr) -> bool:
 
 def _by_bound(form: MinForm) -> MinForm | None:
     for unknown in sorted((u for u in form.unknowns if isinstance(u, Multiplier)), key=default_sort_key, reverse=True):
-        found = _bounded(form, unknown)
+        found = _bounded_both_ways(form, unknown) if isinstance(unknown, FreeMultiplier) else _bounded(form, unknown)
         if found is not None:
             return found
     return None
@@ -214,6 +238,40 @@ def _bounded(form: MinForm, unknown: Multiplier) -> MinForm | None:
         inequalities=tuple(substituted(f, table) for f in others),
         unknowns=tuple(u for u in form.unknowns if u != unknown),
         conditions=tuple(dict.fromkeys((*form.conditions, *conditions))),
+    )
+
+
+def _bounded_both_ways(form: MinForm, unknown: Multiplier) -> MinForm | None:
+    """A free multiplier κ with lower bounds l and upper bounds u takes the one that the objective, linear in κ, asks for."""
+    if any(mentions(e, {unknown}) for e in form.equalities):
+        return None
+    lower, upper, others = [], [], []
+    for f in form.inequalities:
+        if not mentions(f, {unknown}):
+            others.append(f)
+            continue
+        weight = f.expand().coeff(unknown, 1)
+        rest = gathered((f - weight * unknown).expand())
+        if weight == 0 or mentions(rest, {unknown}) or _has_duals(weight) or weight.has(Multiplier):
+            return None
+        down = weight.could_extract_minus_sign()
+        (lower if down else upper).append(rest / -weight if down else rest / weight)
+    slope = form.value.expand().coeff(unknown, 1)
+    if mentions((form.value - slope * unknown).expand(), {unknown}) or _has_duals(slope) or slope.has(Multiplier):
+        return None
+    falling = slope.could_extract_minus_sign()
+    if (falling and not upper) or (not falling and not lower):
+        return None
+    # κ ≤ −u for the upper bounds: the least of them is minus the largest u
+    solution = -reduce(Maximum, upper) if falling else reduce(Maximum, lower)
+    table = {unknown: solution}
+    crossed = tuple(a + b for a in lower for b in upper)
+    return replace(
+        form,
+        value=substituted(form.value, table),
+        inequalities=(*others, *crossed),
+        unknowns=tuple(u for u in form.unknowns if u != unknown),
+        conditions=form.conditions if slope.is_number else (*form.conditions, -slope if falling else slope),
     )
 
 

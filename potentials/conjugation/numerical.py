@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from ...errors import ConvergenceError, DeclarationError, InputError
+from ..atoms.norm import NormLeaf
 from ..derivative import partial
 from ..evaluate import evaluate
 from ..extended import Extended, as_extended
@@ -119,6 +120,15 @@ class _Supremum:
         # plain symbols in place of forces and rates, which hold their variable as an argument (∇T holds T, which is data)
         self.plain = {slot: _plain(slot, k) for k, slot in enumerate(self.slots)}
         self.function = self.function.map(lambda e: e.xreplace(self.plain))
+        # surfaces f and −f, and ‖T‖ ≤ 0, are equalities: they hold up to rounding, and no point is moved off them
+        surfaces = self.function.surfaces
+        self.equalities, self.inequalities = [], []
+        for k, f in enumerate(surfaces):
+            twin = next((j for j, g in enumerate(surfaces) if j != k and (f + g).expand() == 0), None)
+            if isinstance(f, NormLeaf) or (twin is not None and twin > k):
+                self.equalities.append(f)
+            elif twin is None:
+                self.inequalities.append(f)
         self.places: dict[Any, int] = {}
         start = 0
         for slot in self.slots:
@@ -178,7 +188,13 @@ class _Supremum:
         frame = Frame(self.places, self.size, self.numbers, True)
         constraints: list[Any] = []
         finite = conic_expression(frame.substituted(self.function.finite), frame, z, constraints)
-        for f in self.function.surfaces:
+        for e in self.equalities:
+            if isinstance(e, NormLeaf):
+                matrix, shift = frame.ranked(e.args[0])  # type: ignore[arg-type]
+                constraints.append(matrix @ z + shift == 0.0)
+            else:
+                constraints.append(conic_expression(frame.substituted(e), frame, z, constraints) == 0.0)
+        for f in self.inequalities:
             surface = conic_expression(frame.substituted(f), frame, z, constraints)
             constraints.append(surface <= 0.0)
         problem = cvxpy.Problem(cvxpy.Minimize((finite - self.dual @ z) / unit), constraints)
@@ -229,20 +245,18 @@ class _Supremum:
         return float(offset) if not hasattr(offset, "shape") or offset.shape == () else 0.0
 
     def _feasible(self, x: Any) -> Any:
-        """x, moved towards zero until every surface is met."""
-        if not self.function.surfaces:
+        """x, moved towards zero until every surface is met (where zero is in the set; equalities keep x as it is)."""
+        if not self._violated(x) or self.equalities:
             return x
         lo, hi = 0.0, 1.0
-        if self._violated(x):
-            for _ in range(60):
-                middle = 0.5 * (lo + hi)
-                lo, hi = (lo, middle) if self._violated(middle * x) else (middle, hi)
-            return lo * x
-        return x
+        for _ in range(60):
+            middle = 0.5 * (lo + hi)
+            lo, hi = (lo, middle) if self._violated(middle * x) else (middle, hi)
+        return lo * x
 
     def _violated(self, x: Any) -> bool:
         table = self._table(x)
-        return any(not float(evaluate(f, table)) <= 0.0 for f in self.function.surfaces)
+        return any(not float(evaluate(f, table)) <= 0.0 for f in self.inequalities)
 
     def _table(self, x: Any) -> dict[Any, Any]:
         return {**self.numbers, **{self.plain[slot]: value for slot, value in self._unpacked(x).items()}}

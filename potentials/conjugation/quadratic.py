@@ -35,6 +35,8 @@ from sympy import (
 )
 
 from ..atoms.atom import Invariant
+from ..atoms.eig_max import EigMaxLeaf
+from ..atoms.eig_min import EigMinLeaf
 from ..atoms.inner import InnerLeaf, inner
 from ..atoms.trace import TraceLeaf, tr
 from ..ranked import Ranked
@@ -374,8 +376,15 @@ def _assembled(pairs: dict[Any, Expr], scalar: Any, duals: dict[Any, Any], whole
 
 
 def opened(expression: Expr) -> Expr:
-    """The expression with traces of sums and products with I written out."""
+    """The expression with traces of sums, products with I and eigenvalues of T + c I written out."""
     table: dict[Any, Any] = {}
+    for leaf in expression.atoms(EigMaxLeaf, EigMinLeaf):
+        terms = leaf.args[0].terms()  # type: ignore[attr-defined]
+        spherical = next((c for t, c in terms.items() if isinstance(t, IdentityTensor)), S.Zero)
+        if spherical != 0 and len(terms) > 1:
+            table[leaf] = spherical + leaf.func(
+                from_terms({t: c for t, c in terms.items() if not isinstance(t, IdentityTensor)})
+            )
     for leaf in expression.atoms(TraceLeaf, InnerLeaf):
         if isinstance(leaf, TraceLeaf):
             atoms = leaf.args[0].terms()  # type: ignore[attr-defined]

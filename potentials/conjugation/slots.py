@@ -18,7 +18,7 @@ from ..ranked import Ranked
 from ..scalars import ScalarVariable
 from ..tensor import identity
 
-__all__ = ["Functional", "Multiplier", "Parts", "functional_of", "mentions", "parts_of"]
+__all__ = ["FreeMultiplier", "Functional", "Multiplier", "Parts", "functional_of", "mentions", "parts_of"]
 
 
 class Multiplier(ScalarVariable):
@@ -30,6 +30,15 @@ class Multiplier(ScalarVariable):
     def __new__(cls, name: str) -> Multiplier:
         # positive: √γ² is γ; the value at γ = 0 is the limit
         return ScalarVariable.__xnew__(cls, name, positive=True)
+
+
+class FreeMultiplier(Multiplier):
+    """Unknown of either sign, of an equality f = 0."""
+
+    __slots__ = ()
+
+    def __new__(cls, name: str) -> FreeMultiplier:
+        return ScalarVariable.__xnew__(cls, name, real=True)
 
 
 def mentions(thing: Any, symbols: Iterable[Any]) -> bool:

@@ -46,9 +46,9 @@ from ..ranked import Ranked
 from ..tensor import from_terms
 from .form import MinForm, NoRule
 from .groups import E, EigenGroup, GaugeGroup, ScalarGroup, root_of
-from .one_variable import conjugate_of_one_variable
+from .one_variable import conjugate_of_one_variable, positive_view
 from .quadratic import Quadratic, tidy_scalar
-from .slots import Functional, Multiplier, Parts, functional_of, mentions, parts_of
+from .slots import FreeMultiplier, Functional, Multiplier, Parts, functional_of, mentions, parts_of
 
 __all__ = ["Sorter"]
 
@@ -82,7 +82,7 @@ class Sorter:
         """The weight of a convex term must be positive: refused if it is not, noted if it depends on parameters."""
         if weight.is_positive or weight.is_nonnegative:
             return
-        if weight.is_negative or weight.is_zero:
+        if weight.xreplace(positive_view(weight)).is_nonpositive:
             raise NoRule(f"{weight}*({term}) is not convex")
         bare = Mul(*(f for f in Mul.make_args(weight) if not isinstance(f, Multiplier)))
         if not bare.has(Multiplier):
@@ -107,6 +107,15 @@ class Sorter:
             "indicator of {f <= 0} ↔ support function, a minimum over the multiplier of f"
         )
         self.add(self.multiplier() * function)
+
+    def add_equation(self, function: Expr) -> None:
+        """Indicator of {function = 0} of an affine function."""
+        count = sum(isinstance(u, FreeMultiplier) for u in self.extra.unknowns)
+        unknown = FreeMultiplier("kappa" if count == 0 else f"kappa_{count + 1}")
+        self.extra = self.extra + MinForm(
+            unknowns=(unknown,), rules=("indicator of {f = 0} ↔ support function, a minimum over the multiplier of f",)
+        )
+        self.add((unknown * function).expand(deep=False))
 
     def _monomials(self, expression: Expr) -> list[tuple[Expr, list[tuple[Any, int]]]]:
         table: dict[Any, Dummy] = {}

@@ -25,18 +25,25 @@ from .elimination import eliminated
 from .form import MinForm, Phase, is_zero
 from .groups import E, EigenGroup, GaugeGroup, QuadraticGroup, ScalarGroup, UnilateralGroup
 from .quadratic import Node, Quadratic, nodes_of, tidy_scalar
-from .slots import Multiplier
+from .slots import Multiplier, functional_of
 from .sorting import Sorter
 
 __all__ = ["conjugate_form"]
 
 
 def conjugate_form(function: Extended, slots: Iterable[Any], duals: dict[Any, Any]) -> MinForm:
-    """F* over `slots` at the given duals; `NoRule` names the term that has no rule."""
-    order = tuple(slots)
-    sorter = Sorter(order)
-    for surface in function.surfaces:
-        sorter.add_surface(surface)
+    """F* over `slots` at the given duals; `NoRule` names the term that has no rule. Surfaces f and −f are the equality f = 0."""
+    order = list(slots)
+    sorter = Sorter(tuple(order))
+    waiting = list(function.surfaces)
+    while waiting:
+        surface = waiting.pop(0)
+        opposite = next((g for g in waiting if (surface + g).expand() == 0), None)
+        if opposite is not None and functional_of(surface, order) is not None:
+            waiting.remove(opposite)
+            sorter.add_equation(surface)
+        else:
+            sorter.add_surface(surface)
     sorter.add(function.finite)
     form = _Sum(sorter, duals).conjugate()
     return eliminated(form, duals)

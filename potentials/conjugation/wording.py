@@ -120,5 +120,7 @@ def variables_shown(symbols: Iterable[Any]) -> Words:
     found = []
     for symbol in symbols:
         a, at = shown(symbol)
-        found.append((f"{a} >= 0", rf"{at} \geq 0") if isinstance(symbol, Multiplier) else (a, at))
+        found.append(
+            (f"{a} >= 0", rf"{at} \geq 0") if symbol.is_positive and isinstance(symbol, Multiplier) else (a, at)
+        )
     return joined(found)
