@@ -37,7 +37,7 @@ def _contact(
 ) -> None:
     """Solve one contact problem u = W r + q with Coulomb friction as given, and report every error measure.
 
-    The errors are recomputed from the reactions by code that the solvers do not share. The exit code is 1 when the tolerance is not reached.
+    The errors are recomputed from the reactions by code that the solvers do not share. Exit code 1: the tolerance was not reached.
 
     Example: fenchel contact PROBLEM.hdf5 --solver auto --tolerance 1e-8 --certify
     """
