@@ -4,8 +4,9 @@ Tensor algebra on sympy, parameters with units and bounds, forces and indicators
 (sympy only); numerical work lives in `fenchel.integrators` and is loaded when asked for.
 """
 
+from typing import TYPE_CHECKING, Any
+
 from ..errors import DeclarationError
-from .conjugation import numerical_conjugate, partial_conjugate, total_conjugate
 from .extended import Extended, indicator
 from .invariants import eig_max, eig_min, eig_sum, inner, norm, pos, tr
 from .law import Law
@@ -16,6 +17,9 @@ from .stiffness import isotropic, lame
 from .tensor import dev, identity, sym_tensor
 from .unilateral import unilateral_conjugate, unilateral_energy
 from .vector import vector
+
+if TYPE_CHECKING:
+    from .conjugation import numerical_conjugate, partial_conjugate, total_conjugate
 
 __all__ = [
     "DeclarationError",
@@ -51,3 +55,12 @@ __all__ = [
     "unilateral_energy",
     "vector",
 ]
+
+
+def __getattr__(name: str) -> Any:
+    # the rules of conjugation are loaded when they are asked for: declaring a law does not need them
+    if name in ("numerical_conjugate", "partial_conjugate", "total_conjugate"):
+        from . import conjugation
+
+        return getattr(conjugation, name)
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")

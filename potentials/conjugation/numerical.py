@@ -200,14 +200,16 @@ class _Supremum:
         problem = cvxpy.Problem(cvxpy.Minimize((finite - self.dual @ z) / unit), constraints)
         if not problem.is_dcp():
             raise DeclarationError(f"the convexity of {self.function} does not follow from the rules of its atoms")
-        if not constraints and finite.is_affine():
-            slope = (
-                np.asarray((finite - self.dual @ z).grad[u].todense()).ravel()
-                if finite.is_constant() is False
-                else -self.dual
-            )
-            if np.abs(slope).max() > 0.0:
+        if not constraints and (isinstance(finite, float) or finite.is_affine()):
+            # y·x less an affine function is bounded only where it is constant
+            ends = [
+                finite if isinstance(finite, float) else self._at(finite, u, e)
+                for e in np.vstack([0 * self.dual, np.eye(self.size)])
+            ]
+            slope = (np.array(ends[1:]) - ends[0]) / length - self.dual
+            if np.abs(slope).max() > 1e-12 * max(float(np.abs(self.dual).max()), 1e-300):
                 return NumericalConjugate(np.inf, {}, 0.0)
+            return NumericalConjugate(-float(ends[0]), self._unpacked(np.zeros(self.size)), 0.0)
         data, chain, _ = problem.get_problem_data(cvxpy.CLARABEL)
         options = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
         raw = chain.solve_via_data(problem, data, solver_opts=options)
@@ -235,6 +237,11 @@ class _Supremum:
         return NumericalConjugate(
             lower, self._unpacked(x), max(-unit * bound - lower, 0.0) if np.isfinite(lower) else np.inf
         )
+
+    @staticmethod
+    def _at(expression: Any, variable: Any, point: Any) -> float:
+        variable.value = point
+        return float(expression.value)
 
     def _constant(self, problem: Any, data: Any, v: Any, Pv: Any, q: Any) -> float:
         """Constant that the canonical form leaves out of the objective."""
