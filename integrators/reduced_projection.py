@@ -174,26 +174,24 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
                     answer[n + k] = z[k]
                 continue
         if plan[CURVED] > 0 and not soft and not phi and nr == 0 and kind == 0:
-            # along the ray to zero force; the surfaces are convex, so that Newton from outside stays outside
+            # along the ray to zero force, which is admissible, to at most twice what is: f may grow fast farther out
+            length = 1.0
             for _ in range(60):
-                finite = _surfaces(law, 1, n, m, mo, kind, r0, nr, forces, c, z, s, gamma, out, f)
-                cut = 1.0
-                for i in range(m):
-                    if f[i] > 0.0:
-                        along = 0.0
-                        for k in range(n):
-                            if W[k, k] > 0.0:
-                                along += out[ig + i * n + k] * z[k]
-                        if along > f[i]:
-                            cut = min(cut, 1.0 - f[i] / along)
-                if not finite:
-                    cut = 0.25
-                if not cut < 0.5:
-                    break
+                length *= 0.5
                 for k in range(n):
-                    if W[k, k] > 0.0:
-                        z[k] *= cut
-                        e[k] = (zt[k] - z[k]) / W[k, k]
+                    z[k] = length * zt[k] if W[k, k] > 0.0 else zt[k]
+                finite = _surfaces(law, 0, n, m, mo, kind, r0, nr, forces, c, z, s, gamma, out, f)
+                inside = finite
+                for i in range(m):
+                    if not f[i] <= 0.0:
+                        inside = False
+                if inside:
+                    length *= 2.0
+                    break
+            for k in range(n):
+                if W[k, k] > 0.0:
+                    z[k] = length * zt[k]
+                    e[k] = (zt[k] - z[k]) / W[k, k]
         mask = 0
         before = math.inf
         for turn in range(TURNS):
@@ -229,7 +227,7 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
                             value += out[il + k * n + j] * W[j, l]
                         M[k, l] = value
                 _solve(M, n, V, 1 + mt)
-            answer_size, trial_size, floor = 0.0, 0.0, 0.0
+            answer_size, trial_size, floor, missed = 0.0, 0.0, 0.0, 0.0
             for k in range(n):
                 if W[k, k] > 0.0:
                     root = math.sqrt(W[k, k])
@@ -254,13 +252,13 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
                         miss = f[0] - result[2] if turn > 0 and f[0] > 0.0 else (0.0 if f[0] <= 0.0 else math.inf)
                     else:
                         miss = min(-f[i], gamma[i] * S[i, i])
-                    residual = max(residual, abs(miss) / math.sqrt(S[i, i]))
+                    missed = max(missed, abs(miss) / math.sqrt(S[i, i]))
                     if i < m:
                         floor = max(floor, out[powers + 9 + i] / math.sqrt(S[i, i]))
-            if turn > 0 and (
-                residual <= 2e-14 * answer_size + 4e-16 * trial_size + 4e-16 * floor
-                or (residual >= 0.5 * before and residual <= 1e-12 * answer_size + 1e-14 * trial_size + 1e-14 * floor)
-            ):
+            residual = max(residual, missed)
+            near = 2e-14 * answer_size + 4e-16 * (trial_size + floor)
+            close = 1e-12 * answer_size + 1e-14 * (trial_size + floor)
+            if turn > 0 and (residual <= near or (residual >= 0.5 * before and residual <= close)):
                 flag = 0
                 break
             mask = multipliers(mask, S, base, mt, soft, out, powers, new, rest, places, L, u, v, result)
@@ -276,6 +274,10 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
             for k in range(n):
                 for l in range(n):
                     bend += de[k] * W[k, l] * de[l]
+            if turn > 0 and missed <= close and math.sqrt(bend) <= near:
+                # the next step is below rounding, whatever the curvature makes of rounding in the residual
+                flag = 0
+                break
             slack = 1e-13 * bend
             for i in range(mt):
                 penalty[i] = max(penalty[i], 1.1 * new[i])

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Abs, Add, Expr, S, Symbol, cse, log, numbered_symbols
+from sympy import Abs, Add, Expr, Function, S, Symbol, cse, log, numbered_symbols
 
 from ..potentials.atoms.positive_part import tidy
 from ..potentials.printer import NumberPrinter
@@ -24,19 +24,33 @@ RATE_TIME = Symbol("dt", positive=True)
 POWERS = 4
 
 
+class Reciprocal(Function):
+    """1/x, and zero at zero: with q = 0 that is an element of the subdifferential of a norm."""
+
+    is_real = True
+
+
 class _GuardedPrinter(NumberPrinter):
-    """Negative powers are zero at zero: with q = 0 that is an element of the subdifferential of a norm."""
+    """Numbers as `number_code` writes them, half-integer powers by roots, and `Reciprocal`."""
 
     def _print_Pow(self, expr: Any, rational: bool = False) -> str:
         base, exponent = expr.as_base_exp()
-        if exponent.is_Rational and exponent.q == 2 and abs(exponent.p) in (3, 5):
+        if exponent.is_Rational and exponent.q == 2 and exponent.p in (3, 5):
             inside = self._print(base)
-            product = "*".join([f"({inside})"] * (abs(exponent.p) // 2) + [f"math.sqrt({inside})"])
-            text = product if exponent.p > 0 else f"1.0/({product})"
-        else:
-            text = super()._print_Pow(expr, rational)
-        negative = exponent.could_extract_minus_sign() and not base.is_number
-        return f"({text} if {self._print(base)} != 0.0 else 0.0)" if negative else text
+            return "(" + "*".join([f"({inside})"] * (exponent.p // 2) + [f"math.sqrt({inside})"]) + ")"
+        return str(super()._print_Pow(expr, rational))
+
+    def _print_Reciprocal(self, expr: Any) -> str:
+        inside = self._print(expr.args[0])
+        return f"(1.0/({inside}) if {inside} != 0.0 else 0.0)"
+
+
+def _guarded(expression: Any) -> Any:
+    """Negative powers of what may vanish as `Reciprocal`."""
+    return expression.replace(
+        lambda e: e.is_Pow and e.exp.could_extract_minus_sign() and not e.base.is_number,
+        lambda e: Reciprocal(e.base**-e.exp),
+    )
 
 
 def _code(expression: Expr) -> str:
@@ -59,7 +73,7 @@ def function_text(reduction: Reduction, first_constant: int) -> tuple[list[str],
         return _hoisted(expression.xreplace(moving), local, constants)
 
     levels = _outputs(reduction, ready)
-    flat = [e for level in levels for _, e in level]
+    flat = [_guarded(e) for level in levels for _, e in level]
     shared, found = cse(flat, symbols=numbered_symbols("x", real=True), order="canonical")
     renamed = {x: Symbol(f"{x}_", real=True) for x, _ in shared}
     shared = [(renamed[x], e.xreplace(renamed)) for x, e in shared]
