@@ -74,10 +74,8 @@ class EigSum(Atom):
         return Operator(functions=((weight * px[0] * py[0], slope),)) if slope.terms() else Operator()
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
-        from ..evaluate import evaluate
-
-        function, values = arguments[0], eigenvalues(arguments[1])
-        return evaluate(function.expr, {function.variables[0]: values}).sum(axis=-1)
+        function, values = arguments[0], eigenvalues(arguments[1])  # the function with its parameters bound
+        return function(values).sum(axis=-1)
 
     def conic(self, node: Any, arguments: tuple[Any, ...], constraints: list[Any]) -> Any:
         """Σ g(μ_i) with the eigenvalues of T majorised by μ₁ ≥ μ₂ ≥ μ₃ (Ben-Tal & Nemirovski 2001, §4.2): μ₃ I ⪯ T ⪯ μ₁ I, Σ μ_i = tr T."""
