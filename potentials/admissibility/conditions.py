@@ -7,8 +7,9 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Abs, Add, Expr, Mul, S, factor, fraction, together
+from sympy import Abs, Add, Expr, Mul, Rational, S, factor, fraction, together
 
+from ..atoms.atom import Invariant
 from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import EVERYWHERE, interval, natural_range, sharp_interval
@@ -62,18 +63,20 @@ class Condition(str):
     def value(self, values: Mapping[Any, float]) -> tuple[float, float] | None:
         """(value, size of its largest part), or None while a symbol in it has no value. NaN where it is not defined."""
         expression: Any = self.expression
-        if self.on_state:
+        if self.on_state or expression.has(Invariant):
             return None
+        exact = {s: Rational(repr(float(v))) for s, v in values.items()}
         if any(s not in values for s in self.symbols):
-            bottom = fraction(expression)[1]
-            known = not bottom.is_number and bottom.free_symbols <= set(values)
-            return (math.nan, 1.0) if known and interval(bottom, lambda s: (values[s],) * 2) == (0.0, 0.0) else None
-        # not by `evaluate`, which takes 1/0 for an element of a subdifferential
-        ends = [interval(part, lambda s: (values[s], values[s])) for part in Add.make_args(expression)]
-        parts = [0.5 * (low + high) for low, high in ends]
-        if not all(map(math.isfinite, (*parts, *(high - low for low, high in ends)))):
-            return math.nan, 1.0
+            bottom = fraction(expression)[1].xreplace(exact)
+            return (math.nan, 1.0) if bottom.is_zero else None
+        parts = [_number(part.xreplace(exact)) for part in Add.make_args(expression)]
         return math.fsum(parts), max(map(abs, parts))
+
+
+def _number(value: Any) -> float:
+    """The number as a float, NaN if it is not finite and real."""
+    found = value.evalf(30) if value.is_number else value
+    return float(found) if found.is_Float or found.is_Rational else math.nan
 
 
 def only_at_zero_of(expression: Any) -> Expr | None:

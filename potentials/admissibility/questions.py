@@ -6,19 +6,28 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Expr, Mul, Pow, S, default_sort_key, simplify
+from sympy import Add, Expr, Mul, Pow, S, default_sort_key, simplify, sqrt
 
 from ..atoms import atom_of
 from ..atoms.atom import Invariant
-from ..atoms.eig_sum import EigSumLeaf
 from ..atoms.maximum import Maximum
 from ..atoms.positive_part import PositivePart
 from ..derivative import invariants_of
 from ..extended import Extended
+from ..invariants import (
+    EigMaxLeaf,
+    EigMinLeaf,
+    EigSumLeaf,
+    InnerLeaf,
+    NormLeaf,
+    PositiveSquareLeaf,
+    PositiveTraceLeaf,
+    TraceLeaf,
+)
 from ..law import Law
 from ..ranked import Ranked
 from ..scalars import ScalarVariable, Temperature
-from ..tensor import TensorSymbol
+from ..tensor import TensorSymbol, identity
 from ..vector import VectorSymbol
 from .convexity import Proof, Prover
 from .counterexample import CounterExample
@@ -320,15 +329,46 @@ def at_zero(expression: Any, variables: Sequence[Any]) -> Any:
     if isinstance(expression, ScalarVariable):
         return S.Zero if expression in variables else expression
     arguments = [at_zero(a, variables) for a in expression.args]
+    spherical = _of_spheres(expression, arguments)
+    if spherical is not None:
+        return spherical
     if isinstance(expression, Invariant):
         ranked = [a for a in arguments if isinstance(a, Ranked)]
         degree = atom_of(expression).degree(expression)
         if degree is not None and degree.is_positive and any(not a.terms() for a in ranked):
             return S.Zero
-        if isinstance(expression, EigSumLeaf) and not ranked[0].terms():
-            function: Any = arguments[0]
-            return 3 * function.expr.xreplace({function.variables[0]: S.Zero})
     return expression.func(*arguments)
+
+
+def _of_spheres(leaf: Any, arguments: list[Any]) -> Any:
+    """Value of an invariant of multiples of the identity; None for anything else."""
+    if not isinstance(leaf, Invariant):
+        return None
+    factors = []
+    for argument in arguments:
+        if isinstance(argument, Ranked):
+            terms = argument.terms()
+            if argument.rank != 2 or set(terms) - {identity}:
+                return None
+            factors.append(terms.get(identity, S.Zero))
+    rule = _SPHERES.get(type(leaf))
+    if rule is not None:
+        return rule(*factors)
+    if isinstance(leaf, EigSumLeaf):
+        function: Any = arguments[0]
+        return 3 * function.expr.xreplace({function.variables[0]: factors[0]})
+    return None
+
+
+_SPHERES: dict[type, Callable[..., Any]] = {
+    TraceLeaf: lambda c: 3 * c,
+    NormLeaf: lambda c: sqrt(3) * Maximum(c, -c),
+    InnerLeaf: lambda c, d: 3 * c * d,
+    EigMaxLeaf: lambda c: c,
+    EigMinLeaf: lambda c: c,
+    PositiveTraceLeaf: lambda c: 3 * PositivePart(c),
+    PositiveSquareLeaf: lambda c: 3 * PositivePart(c) ** 2,
+}
 
 
 def _data(expression: Any, variables: Sequence[Any], rng: Any) -> list[dict[Any, Any]]:

@@ -125,26 +125,30 @@ class Space:
                 block[rng.random(count) < 0.35] = 0.0
             block *= 10.0 ** rng.normal(0.0, 0.7, (count, 1))
             start += size
-        wide = rng.random(count) < 0.5
-        points *= 10.0 ** np.where(wide, rng.uniform(-7, 7, count), rng.uniform(-1.5, 1.5, count))[:, None]
+        # of the order of one or of a parameter: far beyond, rounding of the deviator is all that is seen
+        sizes = np.array([1.0, *{abs(float(v)) for v in self.parameters.values() if v != 0.0}])
+        wide = np.where(rng.random(count) < 0.3, rng.uniform(-4, 4, count), rng.uniform(-1.5, 1.5, count))
+        points *= (rng.choice(sizes, count) * 10.0**wide)[:, None]
         for column in self.positive:
             points[:, column] = 10.0 ** rng.uniform(-1, 3.3, count)
         return points
 
     def reflected(self, points: Any, rng: Any) -> Any:
-        """Pairs of points and their mirror images: every variable as it is or with its sign turned, tensors also in one part only."""
+        """Pairs of points and their images: every variable, and both parts of a tensor, as it is, turned, or stretched."""
         import numpy as np
+
+        def factors() -> Any:
+            sign = np.where(rng.random((len(points), 1)) < 0.5, -1.0, 1.0)
+            stretch = 10.0 ** rng.normal(0.0, 0.5, (len(points), 1))
+            return sign * np.where(rng.random((len(points), 1)) < 0.6, 1.0, stretch)
 
         found, start = points.copy(), 0
         for size in self.sizes:
             block = points[:, start : start + size]
-            image = -block
+            mean = np.zeros_like(block)
             if size == 6:
-                mean = np.zeros_like(block)
                 mean[:, :3] = block[:, :3].mean(axis=1, keepdims=True)
-                part = rng.integers(0, 3, (len(points), 1))
-                image = np.where(part == 0, image, np.where(part == 1, block - 2.0 * mean, 2.0 * mean - block))
-            found[:, start : start + size] = np.where(rng.random((len(points), 1)) < 0.7, image, block)
+            found[:, start : start + size] = factors() * (block - mean) + factors() * mean
             start += size
         return np.hstack([points, found])
 
@@ -175,10 +179,6 @@ def search_not_convex(
         bent = _bent(space, expression, goal, starts[:24])
         return np.concatenate([*pairs, space.reflected(starts, rng), bent])
 
-    best = _climb(score, begin, rng, budget)
-    if best is None:
-        return None
-
     def verified(pair: Any) -> CounterExample | None:
         points = (pair[:n], pair[n:], _middle(pair[:n], pair[n:]))
         try:
@@ -193,7 +193,7 @@ def search_not_convex(
         rule = f"{name} is not {'convex' if goal > 0 else 'concave'}"
         return _example(space, rule, name, points, values, violation)
 
-    return _rounded(best, score, verified)
+    return _find(score, begin, verified, rng, budget)
 
 
 def search_set(space: Space, surfaces: Sequence[Expr], name: str, rng: Any, budget: Budget) -> CounterExample | None:
@@ -227,10 +227,6 @@ def search_set(space: Space, surfaces: Sequence[Expr], name: str, rng: Any, budg
         first, second = inside[place], inside[np.clip(near, 0, len(inside) - 1)]
         return np.concatenate([np.hstack([first, second]), space.reflected(first, rng)])
 
-    best = _climb(score, begin, rng, budget)
-    if best is None:
-        return None
-
     def verified(pair: Any) -> CounterExample | None:
         points = (pair[:n], pair[n:], _middle(pair[:n], pair[n:]))
         try:
@@ -242,7 +238,7 @@ def search_set(space: Space, surfaces: Sequence[Expr], name: str, rng: Any, budg
         shown = "f" if len(surfaces) == 1 else "max f"
         return _example(space, f"{name} is not convex, its set {{f <= 0}} is not", shown, points, values, values[2])
 
-    return _rounded(best, score, verified)
+    return _find(score, begin, verified, rng, budget)
 
 
 def search_negative(
@@ -257,10 +253,6 @@ def search_negative(
             found = np.minimum(-value / size, _inside(space, surfaces, points))
         return np.where(np.isfinite(found), found, -np.inf)
 
-    best = _climb(score, lambda: space.starts(rng, 3 * budget.starts), rng, budget)
-    if best is None:
-        return None
-
     def verified(point: Any) -> CounterExample | None:
         try:
             value = space.exact(expression, point)
@@ -273,7 +265,7 @@ def search_negative(
             None if value >= -SURE * size else _example(space, f"{name} is negative", name, (point,), (value,), -value)
         )
 
-    return _rounded(best, score, verified)
+    return _find(score, lambda: space.starts(rng, 3 * budget.starts), verified, rng, budget)
 
 
 def _inside(space: Space, surfaces: Sequence[Expr], points: Any) -> Any:
@@ -293,7 +285,7 @@ def _points_inside(space: Space, surfaces: Sequence[Expr], rng: Any, budget: Bud
     import numpy as np
 
     rays = space.starts(rng, budget.starts)
-    lengths = 10.0 ** np.linspace(-9, 9, 55)
+    lengths = 10.0 ** np.linspace(-4, 4, 49)
     points = (lengths[None, :, None] * rays[:, None, :]).reshape(-1, space.dimension)
     inside = (_inside(space, surfaces, points) >= 0.0).reshape(len(rays), -1)
     found = [points[inside.ravel()]]
@@ -335,27 +327,33 @@ def _bent(space: Space, expression: Expr, goal: int, bases: Any) -> Any:
     return np.array(found).reshape(-1, 2 * n)
 
 
-def _climb(score: Callable[[Any], Any], begin: Callable[[], Any], rng: Any, budget: Budget) -> Any:
-    """Best point after random improvement from several beginnings, or None if nothing is seen."""
-    import numpy as np
-
-    best_points, best_values = None, np.empty(0)
+def _find(
+    score: Callable[[Any], Any], begin: Callable[[], Any], verified: Callable[[Any], Any], rng: Any, budget: Budget
+) -> CounterExample | None:
+    """A find that stands with fifty digits, from several beginnings; of the clear ones the plainest, with few digits."""
     for _ in range(budget.restarts):
         points, values = _ascent(score, begin(), rng, budget)
-        if len(values) and (best_points is None or values.max() > best_values.max()):
-            best_points, best_values = points, values
-        if budget.over or (len(best_values) and best_values.max() > 1e-2):
+        for candidate in _plainest(points, values):
+            found = _rounded(candidate, score, verified)
+            if found is not None:
+                return found
+        if budget.over:
             break
-    if best_points is None or best_values.max() <= SEEN:
-        return None
-    points, values = best_points, best_values
-    top = float(values.max())
-    # of the clear finds the plainest: few entries, of the order of one
-    clear = np.flatnonzero(values > 0.3 * min(top, 0.3))
-    size = np.abs(points[clear])
+    return None
+
+
+def _plainest(points: Any, values: Any, count: int = 12) -> Any:
+    """Of the clear finds those with few entries, of the order of one."""
+    import numpy as np
+
+    top = float(values.max(initial=-np.inf))
+    if top <= SEEN:
+        return []
+    clear = points[values > 0.3 * min(top, 0.3)]
+    size = np.abs(clear)
     least = np.where(size > 0.0, size, np.inf).min(axis=1)
     spread = np.abs(np.log10(size.max(axis=1) + 1e-300)) + np.abs(np.log10(np.minimum(least, 1e300)))
-    return points[clear[int(np.argmin(spread + 0.1 * (size > 0.0).sum(axis=1)))]]
+    return clear[np.argsort(spread + 0.1 * (size > 0.0).sum(axis=1))[:count]]
 
 
 def _ascent(score: Callable[[Any], Any], starts: Any, rng: Any, budget: Budget) -> tuple[Any, Any]:
