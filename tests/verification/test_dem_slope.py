@@ -1,0 +1,119 @@
+"""The slope deposit: its start, its rest (the floor carries the weight), and that it goes on bit for bit."""
+
+from __future__ import annotations
+
+import pickle
+
+import numpy as np
+import pytest
+
+from fenchel.dem import Assembly, Material
+from fenchel.dem.measures import coordination
+from fenchel.dem.samples import UniformByNumber, random_sample
+from fenchel.dem.slope import SlopeDeposit, slope_start
+from fenchel.errors import ConvergenceError, InputError
+
+RADIUS = 0.4e-3
+DENSITY = 2600.0
+LAW = Material(friction=0.5, bead_friction=0.5, wire_stiffness=100.0)
+
+
+@pytest.fixture(scope="module")
+def start() -> Assembly:
+    sizes = UniformByNumber(small=0.7 * RADIUS, large=1.3 * RADIUS)
+    block = random_sample(
+        np.random.default_rng(2),
+        sizes,
+        120,
+        wire_density=0.5 / (2.0 * RADIUS) ** 2,
+        beads=12,
+        laying="layers",
+        layers=4,
+    )
+    return slope_start(block, density=DENSITY, reach=1.5)
+
+
+@pytest.fixture(scope="module")
+def settled(start: Assembly) -> SlopeDeposit:
+    deposit = SlopeDeposit(start.copy(), LAW, density=DENSITY)
+    while not deposit.done:
+        deposit.advance()
+    return deposit
+
+
+def test_the_block_starts_free_of_overlap_above_a_hexagonal_floor(start: Assembly) -> None:
+    fixed = np.isinf(start.mass)
+    assert fixed.sum() > 100 and np.all(start.x[fixed, 2] == -start.radius[fixed][0])
+    floor = start.x[fixed][:, :2]
+    distance = np.linalg.norm(floor[:, None] - floor[None], axis=2) / (2.0 * start.radius[fixed][0])
+    inner = np.all(np.abs(floor) < 0.5 * floor.max(axis=0), axis=1)
+    assert np.all(np.sum(np.abs(distance[inner] - 1.0) < 1e-9, axis=1) == 6)  # touching, six neighbours
+    i, j = np.triu_indices(len(start.x), 1)
+    gap = np.linalg.norm(start.x[i] - start.x[j], axis=1) - start.radius[i] - start.radius[j]
+    tied = (
+        (start.wire[i] >= 0) & (start.wire[i] == start.wire[j]) & (np.abs(start.rank[i] - start.rank[j]) < start.apart)
+    )
+    assert gap[~tied & ~(fixed[i] & fixed[j])].min() > -3e-3 * RADIUS
+    assert np.all(start.x[~fixed, 2] > start.radius[~fixed])
+    np.testing.assert_allclose(start.mass[~fixed], DENSITY * 4.0 / 3.0 * np.pi * start.radius[~fixed] ** 3)  # beads too
+    d = np.linalg.norm(start.x[start.links[:, 0]] - start.x[start.links[:, 1]], axis=1)
+    np.testing.assert_allclose(start.link_length, d, rtol=1e-12)
+
+
+def test_at_rest_the_floor_carries_the_weight(settled: SlopeDeposit) -> None:
+    """Statics from outside: the vertical contact forces on the fixed bodies against the weight of all that lies on them."""
+    network, a = settled.network(), settled.assembly
+    force = network.normal_force[:, None] * network.normal + network.tangential_force
+    total = np.zeros((len(a.x), 3))
+    np.add.at(total, network.pair[:, 0], force)
+    np.add.at(total, network.pair[:, 1], -force)
+    vector = network.tension[:, None] * network.link_vector / network.link_length[:, None]
+    np.add.at(total, network.link[:, 0], vector)
+    np.add.at(total, network.link[:, 1], -vector)
+    kept = settled.deposited
+    weight = 9.81 * a.mass[kept].sum()
+    on_floor = total[network.fixed].sum(axis=0)
+    assert on_floor[2] == pytest.approx(-weight, rel=0.01) and np.linalg.norm(on_floor[:2]) < 0.01 * weight
+    # body by body: contacts, links and weight leave little over
+    left = total[kept] - 9.81 * a.mass[kept, None] * np.array([0.0, 0.0, 1.0])
+    assert np.linalg.norm(left, axis=1).mean() < 0.02 * network.normal_force.mean()
+
+
+def test_the_heap(settled: SlopeDeposit, start: Assembly) -> None:
+    kept = settled.deposited
+    moving = np.isfinite(start.mass)
+    assert kept.sum() > 0.95 * moving.sum() and settled.fraction == 1.0
+    before = float((start.x[moving, 2] + start.radius[moving]).max())
+    found = settled.repose(azimuths=2)
+    assert 1.0 < found.angle < 30.0 and 2.0 * RADIUS < found.height < 0.8 * before
+    assert coordination(settled.network(), phase="grains").mean > 3.0
+    level = settled._energy()
+    assert level.kinetic < 1e-6 * (settled.start - level.potential)
+
+
+def test_a_deposit_goes_on_bit_for_bit(start: Assembly) -> None:
+    whole = SlopeDeposit(start.copy(), LAW, density=DENSITY)
+    for _ in range(200):
+        whole.advance()
+    first = SlopeDeposit(start.copy(), LAW, density=DENSITY)
+    for _ in range(120):
+        first.advance()
+    state = pickle.loads(pickle.dumps((first.assembly.arrays(), first.state())))
+    again = SlopeDeposit(Assembly.from_arrays(state[0]), LAW, density=DENSITY)
+    again.restore(state[1])
+    for _ in range(80):
+        again.advance()
+    for name, value in whole.assembly.arrays().items():
+        np.testing.assert_array_equal(value, again.assembly.arrays()[name])
+    assert whole.state() == again.state()
+
+
+def test_what_is_no_deposit(start: Assembly) -> None:
+    impatient = SlopeDeposit(start.copy(), LAW, density=DENSITY, step_limit=5)
+    with pytest.raises(ConvergenceError, match="step_limit"):
+        for _ in range(6):
+            impatient.advance()
+    with pytest.raises(InputError, match="rest"):
+        SlopeDeposit(start.copy(), LAW, density=DENSITY, rest=0.0)
+    with pytest.raises(InputError, match="spheres in space"):
+        slope_start(Assembly.of_spheres(np.zeros((1, 2)), np.ones(1), np.ones(1), np.ones(2)), density=DENSITY)
