@@ -64,10 +64,23 @@ def build_table(law: Law, formulation: str, split: str) -> Table:
         raise InputError(f"formulation {formulation!r} is not known; it is 'strain' or 'stress'")
     if split not in ("total", "reversible"):
         raise InputError(f"split {split!r} is not known; it is 'total' or 'reversible'")
-    from .table_rows import Writer
+    from .table_flow import FlowRows
+    from .table_frame import FrameRows
+    from .table_notation import Notation
+    from .table_state import StateRows
 
-    irreversible = irreversible_of(law) if split == "reversible" else None
-    return Table(law.name, formulation, split, tuple(Writer(law, irreversible).rows(formulation)))
+    notation = Notation(law, irreversible_of(law) if split == "reversible" else None)
+    frame, state, flow = FrameRows(notation), StateRows(notation), FlowRows(notation)
+    laws = state.strain_form() if formulation == "strain" else state.stress_form()
+    rows = (
+        *frame.opening(),
+        *notation.rho_row,
+        *laws,
+        *flow.rate_form(),
+        *flow.force_form(),
+        *frame.notes(formulation),
+    )
+    return Table(law.name, formulation, split, rows)
 
 
 def irreversible_of(law: Law) -> tuple[TensorSymbol, ...]:

@@ -9,10 +9,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-from sympy import Symbol
+from sympy import Add, Mul, S, Symbol, expand_mul
 
 from ...errors import DeclarationError, InputError
 from ..extended import Extended, as_extended
+from ..invariants import InnerLeaf
 from ..law import Law
 from ..names import checked_name
 from ..ranked import Ranked
@@ -21,8 +22,10 @@ from ..scalars import ForceScalar, RateScalar, ScalarVariable, Temperature
 from ..tensor import ForceTensor, RateTensor, TensorSymbol, sym_tensor
 from ..vector import ForceVector, RateVector, VectorSymbol, vector
 from .conjugate import Conjugate, conjugate
+from .slots import mentions
 
 __all__ = [
+    "conjugate_of_stress_potential",
     "dissipation_pair",
     "dual_of",
     "energy_from_conjugate",
@@ -151,12 +154,25 @@ def _duals(variables: Iterable[Any], names: str | None) -> dict[Any, Any]:
 # -- what a law asks for -------------------------------------------------------------------------------------------------------------
 
 
-def energy_from_conjugate(law: Law) -> Any:
-    """ρψ [J/m³] of a law declared by ψ*: sup over σ of σ:ε − ρψ*(σ), at fixed internal variables and temperature."""
+def conjugate_of_stress_potential(law: Law) -> tuple[Conjugate, dict[Any, Any]]:
+    """Conjugate of ρψ*(σ) at ε, without the terms σ:x of internal tensors, and the table that puts ε − Σ x in the place of ε."""
     stress, declared = law.stress_symbol, law.psi_star
     assert stress is not None and declared is not None
-    function = declared if law.density is None else law.density * declared
-    found = conjugate(Extended(function), {stress: law.observable})
+    kept, strain = [], law.observable
+    for term in Add.make_args(expand_mul(declared if law.density is None else law.density * declared, deep=False)):
+        leaf = next((f for f in Mul.make_args(term) if isinstance(f, InnerLeaf) and stress in f.args), None)
+        other = None if leaf is None else leaf.args[leaf.args[0] == stress]
+        weight = term / leaf if leaf is not None else S.One
+        if other is None or mentions(other, {stress}) or mentions(weight, (stress, *law.internal)):
+            kept.append(term)
+        else:
+            strain = strain - other * weight
+    return conjugate(Extended(Add(*kept)), {stress: law.observable}), {law.observable: strain}
+
+
+def energy_from_conjugate(law: Law) -> Any:
+    """ρψ [J/m³] of a law declared by ψ*: sup over σ of σ:ε − ρψ*(σ), at fixed internal variables and temperature."""
+    found, table = conjugate_of_stress_potential(law)
     if not found.closed:
         raise DeclarationError(
             f"law '{law.name}': no closed conjugate is known for psi_star ({found.missing or 'it is a minimum'}); declare psi instead"
@@ -166,7 +182,7 @@ def energy_from_conjugate(law: Law) -> Any:
             f"law '{law.name}': the psi of this psi_star is infinite outside {found.words()[0].partition(' if ')[2] or 'a set'}; "
             "a free energy is finite, add a compliance to psi_star or declare psi"
         )
-    return found.expression
+    return found.expression.xreplace(table)
 
 
 def force_potential_from_rates(law: Law) -> Extended | None:

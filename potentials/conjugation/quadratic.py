@@ -27,7 +27,6 @@ from sympy import (
     Pow,
     Rational,
     S,
-    Symbol,
     cancel,
     default_sort_key,
     factor,
@@ -72,35 +71,37 @@ def tidy_scalar(expression: Expr) -> Expr:
 
 def gathered(expression: Expr) -> Expr:
     """A polynomial in invariants and variables with factored coefficients; terms that are no polynomial stay as they stand."""
-    plain, odd = [], []
+    plain, warm, odd = [], [], []
     for term in Add.make_args(expression):
-        (odd if _is_odd(term) else plain).append(term)
-    return _polynomial(Add(*plain)) + Add(*odd)
+        if _is_odd(term):
+            odd.append(term)
+        else:
+            data = term.has(Temperature) and not term.atoms(Invariant) and not _variables(term)
+            (warm if data else plain).append(term)
+    return _polynomial(Add(*plain)) + tidy_scalar(Add(*warm)) + Add(*odd)
 
 
 def _is_odd(term: Expr) -> bool:
-    """True if a function, or a power that is no polynomial, of a variable stands in the term."""
+    """True if a function, or a power that is no polynomial, of a variable or of the temperature stands in the term."""
     for node in term.atoms(Function, Pow):
         if isinstance(node, Pow) and node.exp.is_Integer and node.exp > 0:
             continue
-        if any(isinstance(a, Invariant) or not _is_coefficient(a) for a in node.atoms(Invariant, ScalarVariable)):
+        if node.atoms(Invariant) or _variables(node) or (isinstance(node, Function) and node.has(Temperature)):
             return True
     return False
 
 
+def _variables(expression: Expr) -> list[Any]:
+    """Scalar variables; multipliers and the temperature count as parameters."""
+    return [s for s in expression.atoms(ScalarVariable) if not _is_coefficient(s)]
+
+
 def _is_coefficient(symbol: Any) -> bool:
-    """Multipliers and the temperature count as parameters."""
     return symbol.role == "multiplier" or isinstance(symbol, Temperature)
 
 
 def _polynomial(expression: Expr) -> Expr:
-    generators = sorted(
-        (
-            *expression.atoms(Invariant),
-            *(s for s in expression.atoms(Symbol) if isinstance(s, ScalarVariable) and not _is_coefficient(s)),
-        ),
-        key=default_sort_key,
-    )
+    generators = sorted((*expression.atoms(Invariant), *_variables(expression)), key=default_sort_key)
     if not generators:
         return tidy_scalar(expression)
     dummies = [Dummy() for _ in generators]

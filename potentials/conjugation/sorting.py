@@ -27,6 +27,7 @@ from sympy import (
     S,
     default_sort_key,
     exp,
+    expand_mul,
     log,
     sqrt,
 )
@@ -93,7 +94,7 @@ class Sorter:
     def add(self, expression: Expr) -> None:
         """Sort the terms of an expression; terms in data alone are kept as they stand."""
         moving = []
-        for term in Add.make_args(expression):
+        for term in Add.make_args(expand_mul(expression, deep=False)):
             if mentions(term, self.known):
                 moving.append(term)
             else:
