@@ -27,12 +27,12 @@ _AXES = "xyz"
 _FULL = 4.0  # forces above this many means are drawn alike
 
 
-def _scale(size: float) -> tuple[float, str]:
-    """Factor and name of the unit in which a length of that size [m] reads best."""
-    for factor, name in ((1.0, "m"), (1e3, "mm"), (1e6, "µm")):
+def _scale(size: float, unit: str) -> tuple[float, str]:
+    """Factor and name of the multiple of a unit in which a positive size reads best."""
+    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
         if size * factor >= 1.0:
-            return factor, name
-    return 1e9, "nm"
+            return factor, prefix + unit
+    return 1e9, "n" + unit
 
 
 def draw_networks(network: Network, *, view: str = "xz", thickness: float | None = None) -> Figure:
@@ -52,25 +52,38 @@ def draw_networks(network: Network, *, view: str = "xz", thickness: float | None
     depth = None if d == 2 else 3 - sum(axes)
     thickness = 4.0 * network.grain_radius if thickness is None else thickness
     linked = len(network.link) > 0
-    low = (network.x - network.radius[:, None]).min(axis=0)[axes]
-    high = (network.x + network.radius[:, None]).max(axis=0)[axes]
-    factor, unit = _scale(float((high - low).max()))
+    # a floor may reach far beyond what lies on it
+    seen = ~network.fixed if not network.fixed.all() else network.fixed
+    low = (network.x[seen] - network.radius[seen, None]).min(axis=0)[axes]
+    high = (network.x[seen] + network.radius[seen, None]).max(axis=0)[axes]
+    margin = 0.02 * float((high - low).max()) + (2.0 * network.grain_radius if network.fixed.any() else 0.0)
+    low, high = low - margin, high + margin
+    factor, unit = _scale(float((high - low).max()), "m")
     count = 2 if linked else 1
     shape = float((high - low)[1] / (high - low)[0])
-    figure = Figure(figsize=(5.2 * count, max(2.0, 3.9 * shape) + 0.8), layout="constrained")
-    panels: list[Any] = list(np.atleast_1d(figure.subplots(1, count, sharex=True, sharey=True)))
-    _contacts(figure, panels[0], network, axes, depth, thickness, factor)
+    wide = shape < 0.7
+    width = 8.0 if wide else 3.9
+    if wide:
+        figure = Figure(figsize=(width + 1.6, count * (width * shape + 0.9)), layout="constrained")
+    else:
+        figure = Figure(figsize=(count * (width + 1.3), width * shape + 0.8), layout="constrained")
+    grid = figure.subplots(count if wide else 1, 1 if wide else count, sharex=True, sharey=True, squeeze=False)
+    panels: list[Any] = list(grid.ravel())
+    # the thickest line is as wide as a mean grain
+    thick = float(np.clip(72.0 * width / (high - low)[0] * network.grain_radius, 1.5, 5.0))
+    _contacts(figure, panels[0], network, axes, depth, thickness, factor, thick)
     if linked:
-        _wires(figure, panels[1], network, axes, factor)
+        _wires(figure, panels[1], network, axes, factor, 0.5 * thick)
     where = "" if depth is None else f", slice of {factor * thickness:.3g} {unit}"
     panels[0].set_title(f"Contact forces{where}", fontsize=10)
-    margin = 0.02 * float((high - low).max())
     for panel in panels:
         panel.set_aspect("equal")
-        panel.set_xlim(factor * (low[0] - margin), factor * (high[0] + margin))
-        panel.set_ylim(factor * (low[1] - margin), factor * (high[1] + margin))
+        panel.set_xlim(factor * low[0], factor * high[0])
+        panel.set_ylim(factor * low[1], factor * high[1])
+    for panel in panels[-1:] if wide else panels:
         panel.set_xlabel(f"{_AXES[axes[0]]} [{unit}]")
-    panels[0].set_ylabel(f"{_AXES[axes[1]]} [{unit}]")
+    for panel in panels if wide else panels[:1]:
+        panel.set_ylabel(f"{_AXES[axes[1]]} [{unit}]")
     return figure
 
 
@@ -95,7 +108,14 @@ def _circles(
 
 
 def _contacts(
-    figure: Any, panel: Any, network: Network, axes: list[int], depth: int | None, thickness: float, factor: float
+    figure: Any,
+    panel: Any,
+    network: Network,
+    axes: list[int],
+    depth: int | None,
+    thickness: float,
+    factor: float,
+    thick: float,
 ) -> None:
     from matplotlib.collections import LineCollection
 
@@ -119,23 +139,24 @@ def _contacts(
         return
     mean = float(network.normal_force.mean()) if len(network.pair) else float(force.mean())
     order = np.argsort(force)
-    strength = np.minimum(force[order] / mean, _FULL)
+    strength = np.minimum(force[order] / mean, _FULL) / _FULL
+    scale, unit = _scale(mean, "N")
     drawn = LineCollection(
-        list(factor * lines[order]), linewidths=0.3 + 1.1 * strength, cmap=_colours(), capstyle="round", zorder=3
+        list(factor * lines[order]), linewidths=0.3 + thick * strength, cmap=_colours(), capstyle="round", zorder=3
     )
-    drawn.set_array(np.asarray(force[order]))
-    drawn.set_clim(0.0, _FULL * mean)
+    drawn.set_array(np.asarray(scale * force[order]))
+    drawn.set_clim(0.0, scale * _FULL * mean)
     panel.add_collection(drawn)
-    bar = figure.colorbar(drawn, ax=panel, extend="max", shrink=0.75, pad=0.02)
-    bar.set_label(f"normal force [N], mean {mean:.2g} N")
+    bar = figure.colorbar(drawn, ax=panel, extend="max", shrink=0.75, pad=0.02, aspect=15)
+    bar.set_label(f"normal force [{unit}], mean {scale * mean:.3g}")
 
 
-def _wires(figure: Any, panel: Any, network: Network, axes: list[int], factor: float) -> None:
+def _wires(figure: Any, panel: Any, network: Network, axes: list[int], factor: float, thick: float) -> None:
     from matplotlib.collections import LineCollection
 
     lines = factor * network.x[network.link][:, :, axes]
     taut = network.tension > 0.0
-    panel.add_collection(LineCollection(list(lines[~taut]), colors="0.75", linewidths=0.7, capstyle="round"))
+    panel.add_collection(LineCollection(list(lines[~taut]), colors="0.75", linewidths=0.3 * thick, capstyle="round"))
     share = float(network.link_length[taut].sum() / network.link_length.sum())
     panel.set_title(f"Wire tensions; {share:.0%} of the length taut, grey: slack", fontsize=10)
     if not taut.any():
@@ -143,17 +164,18 @@ def _wires(figure: Any, panel: Any, network: Network, axes: list[int], factor: f
     tension = network.tension[taut]
     order = np.argsort(tension)
     top = float(np.quantile(tension, 0.99))
+    scale, unit = _scale(top, "N")
     drawn = LineCollection(
         list(lines[taut][order]),
-        linewidths=0.8 + 1.6 * np.minimum(tension[order] / top, 1.0),
+        linewidths=0.3 * thick + 0.7 * thick * np.minimum(tension[order] / top, 1.0),
         cmap=_colours(),
         capstyle="round",
     )
-    drawn.set_array(np.asarray(tension[order]))
-    drawn.set_clim(0.0, top)
+    drawn.set_array(np.asarray(scale * tension[order]))
+    drawn.set_clim(0.0, scale * top)
     panel.add_collection(drawn)
-    bar = figure.colorbar(drawn, ax=panel, extend="max", shrink=0.75, pad=0.02)
-    bar.set_label("wire tension [N]")
+    bar = figure.colorbar(drawn, ax=panel, extend="max", shrink=0.75, pad=0.02, aspect=15)
+    bar.set_label(f"wire tension [{unit}]")
 
 
 def write_picture(network: Network, path: Path | str, *, view: str = "xz", thickness: float | None = None) -> Path:
