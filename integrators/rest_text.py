@@ -25,7 +25,7 @@ def rest_text(law: Law, rest: Expr) -> tuple[list[str], list[Expr]]:
     writer.line("if want_ == 0:")
     writer.line("return", 1)
     operator = second_derivative(rest, law.observable, law.observable)
-    if operator.functions:
+    if operator.functions or operator.extremes or operator.sandwiched:
         raise NoReduction(f"law '{law.name}': psi holds a spectral function of the strain")
     writer.line(f"c0_ = {writer.code(operator.c0)}")
     writer.line(f"c1_ = {writer.code(operator.c1)}")

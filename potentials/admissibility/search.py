@@ -19,7 +19,7 @@ from .exact import DIGITS, NotExact, exact_value
 
 __all__ = ["Budget", "Space", "search_negative", "search_not_convex", "search_set"]
 
-SEEN, SURE = 1e-7, 1e-9
+SEEN, SURE = 1e-7, 1e-8
 """Violations relative to the size of the terms: what a search takes for a find, and what must be left with fifty digits."""
 
 

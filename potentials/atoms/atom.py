@@ -15,6 +15,8 @@ from sympy import Basic, Expr, S
 
 from ...errors import DeclarationError
 from ..operator import Operator
+from ..scalars import ScalarVariable
+from ..tensor import TensorSymbol, dev, identity
 
 __all__ = ["Atom", "Invariant", "Require"]
 
@@ -91,3 +93,11 @@ class Atom:
         """Legendre–Fenchel conjugate of the node as a function of its own (single) argument, at `dual`: (value, domain as
         expressions ≤ 0); of a concave node, that of its negative; None if no closed form is known."""
         return None
+
+    def examples(self) -> tuple[Any, ...]:
+        """Nodes on which whatever the record says can be tried: by default of a tensor, of its deviator and of a shifted one, or of a
+        scalar."""
+        if not issubclass(self.node, Invariant):
+            return (self.node(ScalarVariable("x")),)
+        tensor = TensorSymbol("X")
+        return tuple(self.node(t) for t in (tensor, dev(tensor), 2 * tensor - identity))

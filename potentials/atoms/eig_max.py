@@ -7,6 +7,7 @@ from typing import Any
 from sympy import Expr, S
 
 from ...errors import DeclarationError
+from ..operator import Operator
 from ..ranked import rank_word
 from ..spectral import EigenDyad, as_matrix, eigenvalues
 from ..tensor import PositiveTensor, SymmetricTensor
@@ -44,6 +45,13 @@ class EigMax(Atom):
         if variable.rank != 2:
             return variable.linear(())
         return adjoint(linear_part(node.args[0], variable), EigenDyad(node.args[0], 1))
+
+    def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
+        if x.rank != 2 or y.rank != 2:
+            return Operator()
+        tensor = node.args[0]
+        dyad = EigenDyad(tensor, 1)
+        return Operator(extremes=((weight, dyad),)).between(linear_part(tensor, x), linear_part(tensor, y))
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         return eigenvalues(arguments[0])[..., 2]

@@ -6,6 +6,7 @@ from typing import Any
 
 from sympy import Expr, S
 
+from ..operator import Operator
 from ..spectral import EigenDyad, as_matrix, eigenvalues
 from ..tensor import SymmetricTensor
 from .atom import Atom, Invariant
@@ -43,6 +44,13 @@ class EigMin(Atom):
         if variable.rank != 2:
             return variable.linear(())
         return adjoint(linear_part(node.args[0], variable), EigenDyad(node.args[0], -1))
+
+    def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
+        if x.rank != 2 or y.rank != 2:
+            return Operator()
+        tensor = node.args[0]
+        dyad = EigenDyad(tensor, -1)
+        return Operator(extremes=((weight, dyad),)).between(linear_part(tensor, x), linear_part(tensor, y))
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         return eigenvalues(arguments[0])[..., 0]

@@ -4,15 +4,15 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, S
+from sympy import Expr, S, exp
 
-from ...errors import DeclarationError
 from ..operator import Operator
 from ..spectral import as_function, eigenvalues, spectral_tensor
-from ..tensor import SymmetricTensor
+from ..tensor import SymmetricTensor, TensorSymbol, dev
 from .atom import Atom, Invariant
 from .eig_max import checked_tensor
 from .linear import adjoint, linear_part
+from .positive_part import PositivePart
 
 __all__ = ["EigSum", "EigSumLeaf", "eig_sum"]
 
@@ -52,6 +52,19 @@ class EigSum(Atom):
         function = node.args[0]
         return one_variable(function.expr, function.variables[0], require)
 
+    def sign(self, node: Any, signs: tuple[int, ...]) -> int:
+        from ..admissibility.bounds import interval
+
+        low, high = interval(node.args[0].expr)
+        return 1 if low >= 0.0 else (-1 if high <= 0.0 else 0)
+
+    def degree(self, node: Any) -> Expr | None:
+        """n of g = c xⁿ and of g = c ⟨x⟩ⁿ."""
+        function = node.args[0]
+        base, exponent = function.expr.as_coeff_Mul()[1].as_base_exp()
+        symbol = function.variables[0]
+        return exponent if base in (symbol, PositivePart(symbol)) else None
+
     def gradient(self, node: Any, variable: Any) -> Any:
         function, tensor = node.args
         if variable.rank != 2:
@@ -62,16 +75,13 @@ class EigSum(Atom):
 
     def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
         function, tensor = node.args
-        px, py = linear_part(tensor, x), linear_part(tensor, y)
-        if px == (S.Zero, S.Zero) or py == (S.Zero, S.Zero):
+        if x.rank != 2 or y.rank != 2:
             return Operator()
-        if px[1] != 0 or py[1] != 0:
-            raise DeclarationError(
-                f"the second derivative of {node} by a deviator is not available; take eig_sum of the tensor itself"
-            )
         symbol = function.variables[0]
         slope = spectral_tensor(lambda t: function.expr.diff(symbol).xreplace({symbol: t}), tensor)
-        return Operator(functions=((weight * px[0] * py[0], slope),)) if slope.terms() else Operator()
+        if not slope.terms():
+            return Operator()
+        return Operator(functions=((weight, slope),)).between(linear_part(tensor, x), linear_part(tensor, y))
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         function, values = arguments[0], eigenvalues(arguments[1])  # the function with its parameters bound
@@ -105,6 +115,11 @@ class EigSum(Atom):
         except NoRule:
             return None
         return found.value, found.inequalities
+
+    def examples(self) -> tuple[Any, ...]:
+        x = TensorSymbol("X")
+        functions = (lambda t: t**2, lambda t: PositivePart(t) ** 3, lambda t: exp(t / 2))
+        return (*(eig_sum(g, x) for g in functions), eig_sum(functions[1], dev(x)))
 
 
 def eig_sum(function: Any, tensor: SymmetricTensor) -> Expr:

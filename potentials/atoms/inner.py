@@ -9,7 +9,8 @@ from sympy import Expr, Integer, S
 from ...errors import DeclarationError
 from ..operator import Operator
 from ..ranked import Ranked
-from ..tensor import PositiveTensor
+from ..tensor import PositiveTensor, TensorSymbol, dev, identity
+from ..vector import VectorSymbol
 from .atom import Atom, Invariant
 from .linear import adjoint, as_pair, compose, linear_part
 from .positive_square import PositiveSquareLeaf
@@ -71,6 +72,10 @@ class Inner(Atom):
 
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
         return (inner(dual, dual) / 4, ()) if node.args[0] == node.args[1] else None
+
+    def examples(self) -> tuple[Any, ...]:
+        x, y, v = TensorSymbol("X"), TensorSymbol("Y"), VectorSymbol("v")
+        return inner(x, x), inner(dev(x), y - identity), inner(v, v)
 
 
 def _ranked(value: object) -> Ranked:

@@ -7,6 +7,7 @@ from typing import Any
 from sympy import Abs, Expr, Function, Max, Min, S
 from sympy.core.function import ArgumentIndexError
 
+from ..scalars import ScalarVariable
 from .atom import Atom
 from .positive_part import PositivePart, Step
 
@@ -90,6 +91,10 @@ class MaximumAtom(Atom):
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
         """Of |x| as a function of x; max(a, b) has two arguments."""
         return (S.Zero, (dual - 1, -dual - 1)) if node.args[0] == -node.args[1] else None
+
+    def examples(self) -> tuple[Any, ...]:
+        x, y = ScalarVariable("x"), ScalarVariable("y")
+        return Maximum(x, y), Maximum(x, -x)
 
 
 def rewrite_maximum(expression: Expr) -> Expr:

@@ -10,6 +10,7 @@ from ...errors import DeclarationError
 from ..operator import Operator
 from ..ranked import Ranked
 from ..tensor import PositiveTensor
+from ..vector import VectorSymbol
 from .atom import Atom, Invariant
 from .inner import inner
 from .linear import adjoint, as_pair, compose, linear_part
@@ -72,6 +73,9 @@ class Norm(Atom):
 
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]]:
         return S.Zero, (norm(dual) - 1,)
+
+    def examples(self) -> tuple[Any, ...]:
+        return (*super().examples(), NormLeaf(VectorSymbol("v")))
 
 
 def norm(quantity: Ranked) -> Expr:

@@ -6,7 +6,6 @@ from typing import Any
 
 from sympy import Expr, Integer, S
 
-from ...errors import DeclarationError
 from ..operator import Operator
 from ..tensor import PositiveTensor, TensorSum
 from .atom import Atom, Invariant
@@ -55,14 +54,10 @@ class PositiveSquare(Atom):
         return TensorSum() if part == (S.Zero, S.Zero) else adjoint(part, PositiveTensor(node.args[0])) * 2
 
     def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
-        px, py = linear_part(node.args[0], x), linear_part(node.args[0], y)
-        if px == (S.Zero, S.Zero) or py == (S.Zero, S.Zero):
+        if x.rank != 2 or y.rank != 2:
             return Operator()
-        if px[1] != 0 or py[1] != 0:
-            raise DeclarationError(
-                f"the second derivative of {node} by a deviator is not available; take pos of the tensor itself"
-            )
-        return Operator(spectral=((2 * weight * px[0] * py[0], node.args[0]),))
+        tensor = node.args[0]
+        return Operator(spectral=((2 * weight, tensor),)).between(linear_part(tensor, x), linear_part(tensor, y))
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         import numpy as np

@@ -6,6 +6,7 @@ from typing import Any
 
 from sympy import Expr, S
 
+from ..operator import Operator
 from .atom import Atom, Invariant
 from .linear import adjoint, linear_part
 
@@ -49,7 +50,19 @@ class PositiveTrace(Atom):
         from ..spectral import spectral_tensor
         from .positive_part import Step
 
+        if variable.rank != 2:
+            return variable.linear(())
         return adjoint(linear_part(node.args[0], variable), spectral_tensor(Step, node.args[0]))
+
+    def second(self, node: Any, x: Any, y: Any, weight: Expr) -> Operator:
+        from ..spectral import spectral_tensor
+        from .positive_part import Step
+
+        if x.rank != 2 or y.rank != 2:
+            return Operator()
+        tensor = node.args[0]
+        slope = spectral_tensor(Step, tensor)
+        return Operator(functions=((weight, slope),)).between(linear_part(tensor, x), linear_part(tensor, y))
 
     def value(self, node: Any, arguments: tuple[Any, ...]) -> Any:
         import numpy as np

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, Pow
+from sympy import Expr, Integer, Pow, Rational
 
 from ...errors import DeclarationError
+from ..scalars import ScalarVariable
 from .atom import Atom, Require
 
 __all__ = ["Power"]
@@ -23,6 +24,8 @@ class Power(Atom):
         exponent = node.exp
         if exponent == 1:
             return "affine"
+        if exponent.is_odd and exponent > 1 and not node.base.is_nonnegative:
+            return "unknown"  # x³ is defined, and bends down, on x < 0
         if exponent.is_number:
             return "convex" if exponent > 1 or exponent < 0 else "concave"
         # a parameter: the only reading that makes a potential is n >= 1
@@ -82,7 +85,11 @@ class Power(Atom):
             return low
         if exponent == -1.0:
             return cvxpy.inv_pos(base)
-        raise DeclarationError(f"{node} has no conic form")
+        # x^(-n) <= t, by a power cone: t^(1/(1+n)) x^(n/(1+n)) >= 1
+        inside, top = cvxpy.Variable(), cvxpy.Variable()
+        constraints.append(inside == base if base.is_affine() else inside <= base)
+        constraints.append(cvxpy.PowCone3D(top, inside, cvxpy.Constant(1.0), 1.0 / (1.0 - exponent)))
+        return top
 
     def conjugate(self, node: Any, dual: Any) -> tuple[Expr, tuple[Expr, ...]] | None:
         """Of xⁿ as a function on x ≥ 0 (of all x for even n ≥ 2); for 0 < n < 1, of −xⁿ."""
@@ -98,3 +105,9 @@ class Power(Atom):
             return None
         inside = dual if n == 2 else Maximum(dual, -dual) if n.is_even else PositivePart(dual)
         return (n - 1) * (inside / n) ** (n / (n - 1)), ()
+
+    def examples(self) -> tuple[Any, ...]:
+        x = ScalarVariable("x")
+        return tuple(
+            x**n for n in (Integer(2), Integer(3), Rational(3, 2), Rational(1, 2), Integer(-1), Rational(-1, 2))
+        )
