@@ -31,9 +31,11 @@ from .repose import Repose, angle_of_repose
 from .sliding import mobilised_friction, sliding_fraction
 from .solid_fraction import shared_volume, solid_fraction
 from .strain import accumulated_gradient, best_fit_gradient, boundary_gradient, delaunay_cells, delaunay_gradient
+from .summary import SUMMARY, summary
 
 __all__ = [
     "KINDS",
+    "SUMMARY",
     "ActiveLength",
     "Coordination",
     "ForceDistribution",
@@ -68,6 +70,7 @@ __all__ = [
     "solid_fraction",
     "straightness",
     "strong_contacts",
+    "summary",
     "wire_fabric",
     "wire_fabric_interval",
     "wire_isotropy_test",

@@ -12,6 +12,7 @@ import pytest
 from fenchel.dem import Assembly, Drive, Material, Simulation, Solver
 from fenchel.dem.homogenise import fit_sums, moments
 from fenchel.dem.measures import (
+    SUMMARY,
     Network,
     accumulated_gradient,
     active_length,
@@ -38,6 +39,7 @@ from fenchel.dem.measures import (
     solid_fraction,
     straightness,
     strong_contacts,
+    summary,
     wire_fabric,
     wire_fabric_interval,
     wire_isotropy_test,
@@ -680,3 +682,17 @@ def test_angle_of_a_roof_and_of_an_oval_heap() -> None:
     assert oval.high - oval.low > 4.0  # it says that the deposit is not round
     with pytest.raises(InputError, match="fewer azimuths"):
         angle_of_repose(*heap(rng, 25.0, 0.2))
+
+
+def test_the_summary_is_the_measures_one_by_one(loaded) -> None:
+    _, _, network = loaded
+    found = summary(network, samples=19)
+    assert list(found) == list(SUMMARY) and not any(np.isnan(value) for value in found.values())
+    assert found["coordination"] == coordination(network).mean and found["sliding"] == sliding_fraction(network)
+    assert (
+        found["fabric_zz"] == contact_fabric(network)[2, 2] and found["active_length"] == active_length(network).length
+    )
+    assert found["solid_fraction_sphere"] == solid_fraction(network, 0.8 * network.half.min())
+    assert found["strong"] == strong_contacts(network).mean()
+    empty = summary(Network.of_assembly(Assembly.of_spheres(np.zeros((1, 3)), np.ones(1), np.ones(1))))
+    assert list(empty) == list(SUMMARY) and empty["coordination"] == 0.0 and np.isnan(empty["active_length"])

@@ -43,7 +43,8 @@ def _dem(
     Example: fenchel dem scene.toml -o run.h5 --export vtk
     """
     from fenchel.dem import run_scene
-    from fenchel.dem.export import export_run
+    from fenchel.dem.export import export_run, network_of_run
+    from fenchel.dem.measures import SUMMARY, summary
     from fenchel.dem.motion_scene import is_motion
     from fenchel.dem.storage import load_run
     from fenchel.dem.triaxial import QUALITY
@@ -57,6 +58,7 @@ def _dem(
     with progress_bar(not quiet) as progress:
         record = run_scene(scene, output, resume=resume, progress=progress)
     exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    measures = summary(network_of_run(output))
     if json_wanted:
         print_json(
             {
@@ -66,6 +68,7 @@ def _dem(
                 "linked": record.linked,
                 "frames": len(record.leg),
                 "quality": record.quality,
+                "measures": measures,
                 "exports": exported,
                 "kernels": load_run(output)[0].get("kernels", {}),
             }
@@ -74,6 +77,8 @@ def _dem(
         rows = [(name, value, *QUALITY[name]) for name, value in record.quality.items()]
         print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
         _print_kernels(load_run(output)[0].get("kernels", {}))
+        rows = [(name, value, *SUMMARY[name]) for name, value in measures.items() if value == value]
+        print_table(("measure", "value", "unit", "meaning"), rows, title="at the end of the test")
         for file in exported:
             typer.echo(f"exported {file}")
 
