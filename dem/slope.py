@@ -2,9 +2,9 @@ r"""The slope deposit: a densified block is released on a floor of fixed beads a
 
 The block is a geometrically densified cube, freed of its overlaps between walls that give way, put just above the floor and released at
 once with its wires free of tension. Contacts are compliant, k_n = 2000 ρ g H d by default, H the side of a cube of all bodies: the
-overlap under the weight of a column stays below 10⁻³ d. The step is √(d/g)/80. Beads weigh what their volume weighs: a scaled mass
-would also scale the weight, and wires that heavy pull the heap down. Beyond the floor lies a plane that catches what rolls off; such
-bodies count neither for the energy nor for the angle.
+overlap under the weight of a column stays below 10⁻³ d. The step is √(d/g)/80, halved where the sweeps do not converge. Beads weigh
+what their volume weighs: a scaled mass would also scale the weight, and wires that heavy pull the heap down. Beyond the floor lies a
+plane that catches what rolls off; such bodies count neither for the energy nor for the angle.
 
 At rest: kinetic energy below 10⁻⁶ of the potential energy that was set free, without that of beads that touch nobody: they swing and
 spin on their wires for ever. A release at once of frictional spheres without rolling resistance gives low heaps: compare with and
@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .adaptive import AdaptiveStep
 from .bodies import Assembly
 from .measures import Network, Repose, angle_of_repose
 from .planes import Plane
@@ -109,6 +110,7 @@ class SlopeDeposit:
         stiffness_factor: float = 2000.0,
         step_fraction: float = 1.0 / 80.0,
         tolerance: float = 1e-3,
+        sweep_limit: int = 3000,
         rest: float = 1e-6,
         step_limit: int = 20_000,
         skin: float = 0.4,
@@ -124,13 +126,17 @@ class SlopeDeposit:
             stiffness = stiffness_factor * density * gravity * self.height * 2.0 * radius
             material = replace(material, normal_stiffness=stiffness, tangential_stiffness=0.8 * stiffness)
         # sweeps that stop early make contacts tremble: the nearer to rest, the tighter
-        self._solvers = [Solver(tolerance=tolerance * 10.0**-k, sweep_limit=20_000) for k in range(len(_TIGHTEN) + 1)]
+        self._solvers = [
+            Solver(tolerance=tolerance * 10.0**-k, sweep_limit=sweep_limit) for k in range(len(_TIGHTEN) + 1)
+        ]
         self.tightened = 0
         catch = Plane(normal=(0.0, 0.0, 1.0), point=(0.0, 0.0, -4.0 * radius), friction=material.friction)
         self.simulation = Simulation(assembly, material, self._solvers[0], planes=(catch,), skin=skin * radius)
         self.drive = Drive(gravity=np.array([0.0, 0.0, -gravity]))
         self.gravity = gravity
-        self.step = step_fraction * float(np.sqrt(2.0 * radius / gravity))
+        step = step_fraction * float(np.sqrt(2.0 * radius / gravity))
+        # a step that does not converge is halved: the compliance then weighs four times as much
+        self.pace = AdaptiveStep(simulation=self.simulation, most=step, least=step / 64.0)
         self.rest = rest
         self.step_limit = step_limit
         self.steps = 0
@@ -174,8 +180,11 @@ class SlopeDeposit:
         return 1.0 if self.done else self.settled
 
     def advance(self) -> dict[str, float]:
-        """One step; returns its measures. Raises `ConvergenceError` when the heap is not at rest after `step_limit` steps."""
-        measures = self.simulation.advance(self.step, self.drive)
+        """One step; returns its measures.
+
+        Raises `ConvergenceError` when the heap is not at rest after `step_limit` steps, or when a step of a 64th of the length fails.
+        """
+        measures = self.pace.advance(self.drive)
         self.steps += 1
         level = self._energy()
         free = max(self.start - level.potential, 1e-12 * abs(self.start))
@@ -210,11 +219,14 @@ class SlopeDeposit:
             "settled": self.settled,
             "start": self.start,
             "tightened": self.tightened,
+            "next_step": self.pace.step,
+            "cuts": self.pace.cuts,
         }
 
     def restore(self, state: dict[str, Any]) -> None:
         """Inverse of `state`."""
         self.steps, self.calm = int(state["steps"]), int(state["calm"])
         self.settled, self.start = float(state["settled"]), float(state["start"])
-        self.tightened = int(state["tightened"])
+        self.tightened, self.pace.cuts = int(state["tightened"]), int(state["cuts"])
+        self.pace.step = float(state["next_step"])
         self.simulation.solver = self._solvers[self.tightened]

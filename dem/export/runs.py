@@ -27,10 +27,10 @@ def network_of_run(path: Path | str) -> Network:
     if "assembly" not in content:
         raise InputError(f"{path}: holds no sample, only results; exports need the run file of a scene")
     scene = settings.get("scene", settings)
-    grains = scene.get("grains") or {}
-    wires = scene.get("wires") or {}
-    friction = float(grains.get("friction", float("nan")))
-    bead_friction = wires.get("friction")
+    # a test says the friction with its grains and wires, a motion with its contact law
+    contact = scene.get("contact") or {}
+    friction = float(contact.get("friction", (scene.get("grains") or {}).get("friction", float("nan"))))
+    bead_friction = contact.get("bead_friction", (scene.get("wires") or {}).get("friction"))
     return Network.of_assembly(
         Assembly.from_arrays(content["assembly"]),
         friction=friction,

@@ -376,3 +376,25 @@ def test_a_run_that_goes_on_is_exported_and_results_without_sample_are_refused(t
         export_run(tmp_path / "results.h5", "vtk")
     with pytest.raises(InputError, match="vtk, xyz, picture"):
         export_run(tmp_path / "half.h5", "stl")  # pyright: ignore[reportArgumentType]
+
+
+def test_a_motion_is_exported_too(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, run = tmp_path / "drop.toml", tmp_path / "drop.h5"
+    scene.write_text("""
+[motion]
+duration = 2e-2
+step = 1e-3
+gravity = [0.0, 0.0, -9.81]
+[[body]]
+position = [0.0, 0.0, 1.01e-2]
+radius = 1e-2
+mass = 1e-2
+[[plane]]
+normal = [0.0, 0.0, 1.0]
+point = [0.0, 0.0, 0.0]
+""")
+    assert main(["dem", str(scene), "-o", str(run), "--quiet", "--json", "--export", "vtk", "--export", "xyz"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["measures"]["grain_wall"] == 1 and told["measures"]["active_length"] is None
+    ((keys, columns),) = read_extended_xyz(tmp_path / "drop.xyz")
+    assert "Lattice" not in keys and columns["contacts"] == [1] and len(told["exports"]) == 3

@@ -44,7 +44,7 @@ def _dem(
     """
     from fenchel.dem import run_scene
     from fenchel.dem.export import export_run, network_of_run
-    from fenchel.dem.measures import SUMMARY, summary
+    from fenchel.dem.measures import summary
     from fenchel.dem.motion_scene import is_motion
     from fenchel.dem.storage import load_run
     from fenchel.dem.triaxial import QUALITY
@@ -53,7 +53,7 @@ def _dem(
     from .tables import print_json, print_table
 
     if is_motion(scene):
-        _motion(scene, output, resume, quiet, json_wanted, bool(export))
+        _motion(scene, output, resume, quiet, json_wanted, export)
         return
     with progress_bar(not quiet) as progress:
         record = run_scene(scene, output, resume=resume, progress=progress)
@@ -77,31 +77,51 @@ def _dem(
         rows = [(name, value, *QUALITY[name]) for name, value in record.quality.items()]
         print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
         _print_kernels(load_run(output)[0].get("kernels", {}))
-        rows = [(name, value, *SUMMARY[name]) for name, value in measures.items() if value == value]
-        print_table(("measure", "value", "unit", "meaning"), rows, title="at the end of the test")
-        for file in exported:
-            typer.echo(f"exported {file}")
+        _print_state(measures, exported)
 
 
-def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: bool) -> None:
+def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
     """Run a scene of free bodies."""
+    from fenchel.dem.export import export_run, network_of_run
+    from fenchel.dem.measures import summary
     from fenchel.dem.motion import QUALITY, run_motion
-    from fenchel.errors import InputError
 
     from .progress import progress_bar
     from .tables import print_json, print_table
 
-    if export:
-        raise InputError("--export: is for tests in a box; the frames of a motion are in the run file")
     with progress_bar(not quiet) as progress:
         content = run_motion(scene, output, resume=resume, progress=progress)
+    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    measures = summary(network_of_run(output))
     frames, quality = content["frames"], content["quality"]
     if json_wanted:
-        print_json({"run": output, "frames": len(frames["time"]), "quality": quality, "kernels": content["kernels"]})
+        print_json(
+            {
+                "run": output,
+                "frames": len(frames["time"]),
+                "quality": quality,
+                "measures": measures,
+                "exports": exported,
+                "kernels": content["kernels"],
+            }
+        )
         return
     rows = [(name, value, *QUALITY[name]) for name, value in quality.items()]
     print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(frames['time'])} frames")
     _print_kernels(content["kernels"])
+    _print_state(measures, exported)
+
+
+def _print_state(measures: dict[str, float], exported: list[Path]) -> None:
+    """What the sample looks like at the end, as far as there is something to measure, and where it was exported to."""
+    from fenchel.dem.measures import SUMMARY
+
+    from .tables import print_table
+
+    rows = [(name, value, *SUMMARY[name]) for name, value in measures.items() if value == value]
+    print_table(("measure", "value", "unit", "meaning"), rows, title="the last state")
+    for file in exported:
+        typer.echo(f"exported {file}")
 
 
 def _print_kernels(report: dict[str, Any]) -> None:
