@@ -204,7 +204,7 @@ class Law:
         """`values`, which also keep the conditions that admissibility puts on the parameters; `InputError` names the first broken one."""
         found = self.values(given)
         if not self.insist:
-            from .admissibility import enforce
+            from .enforce import enforce
 
             enforce(self, found)
         return found
@@ -258,7 +258,7 @@ class Law:
         on its parameters but their bounds.
         """
         if not insist:
-            from .admissibility import refuse
+            from .enforce import refuse
 
             refuse(self)
         law = replace(self, insist=True) if insist else self

@@ -3,7 +3,6 @@
 from .check import check
 from .conditions import Condition
 from .counterexample import CounterExample
-from .enforce import enforce, refuse
 from .report import AdmissibilityReport
 
-__all__ = ["AdmissibilityReport", "Condition", "CounterExample", "check", "enforce", "refuse"]
+__all__ = ["AdmissibilityReport", "Condition", "CounterExample", "check"]

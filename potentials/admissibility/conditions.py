@@ -10,13 +10,12 @@ from typing import Any
 from sympy import Abs, Add, Expr, Mul, Rational, S, factor, fraction, together
 
 from ..atoms.atom import Invariant
+from ..enforce import ROUNDING
 from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import EVERYWHERE, interval, natural_range, sharp_interval
 
 __all__ = ["Condition", "Need", "as_conditions", "holds", "only_at_zero_of", "softens"]
-
-ROUNDING = 1e-10
 
 
 @dataclass(frozen=True)

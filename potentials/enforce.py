@@ -14,19 +14,20 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 from types import ModuleType
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from ...cache import cache_folder, content_hash, source_hash
-from ...errors import DeclarationError, InputError, StorageError
-from ..atoms import ATOMS
-from ..law import Law
-from ..printer import number_code
-from .check import check
-from .conditions import ROUNDING, Condition
+from ..cache import cache_folder, content_hash, source_hash
+from ..errors import DeclarationError, InputError, StorageError
+from .atoms import ATOMS
 
-__all__ = ["enforce", "refuse"]
+if TYPE_CHECKING:
+    from .law import Law
+
+__all__ = ["ROUNDING", "enforce", "refuse"]
 
 SEARCH_SECONDS = 1.0
+ROUNDING = 1e-10
+"""Share of its largest term by which a condition may fail: exactly singular moduli pass in spite of rounding."""
 
 
 def refuse(law: Law) -> None:
@@ -47,6 +48,8 @@ def enforce(law: Law, values: Mapping[str, float]) -> None:
         return
     failed = _first_failure(record, key)
     if failed is not None:
+        from .admissibility import check
+
         about, names, variables, text, value = failed
         # the conditions suffice; where one fails, another rule may hold for these values
         if value != value or check(law, values, seconds=SEARCH_SECONDS).admissible is not True:
@@ -123,6 +126,9 @@ def _record(law: Law) -> ModuleType:
 
 def record_source(law: Law) -> str:
     """Text of the record: the refusal or "", the conditions with what they are about, and their numbers with the size of their terms."""
+    from .admissibility import check
+    from .printer import number_code
+
     report = check(law, {}, seconds=SEARCH_SECONDS)
     refused = ""
     if report.admissible is False:
@@ -154,7 +160,7 @@ def record_source(law: Law) -> str:
     )
 
 
-def _row(condition: Condition) -> tuple[str, str, str, str, bool]:
+def _row(condition: Any) -> tuple[str, str, str, str, bool]:
     return (
         f"{condition.potential} {condition.about}",
         " ".join(s.name for s in condition.symbols),
