@@ -32,7 +32,9 @@ def assemble(
 ) -> Global:
     """Contacts (i, j, arm_i, arm_j, normal from j to i); j = −1 is the ground. `velocity` (bodies, 6) is free of contact impulses."""
     dofs = 6 * len(masses)
-    mass = np.concatenate([np.repeat(masses[:, None], 3, axis=1), np.repeat(inertias[:, None], 3, axis=1)], axis=1).ravel()
+    mass = np.concatenate(
+        [np.repeat(masses[:, None], 3, axis=1), np.repeat(inertias[:, None], 3, axis=1)], axis=1
+    ).ravel()
     rows, columns, values = [], [], []
     for k, (i, j, arm_i, arm_j, normal) in enumerate(contacts):
         for s, direction in enumerate(frame(normal)):
@@ -46,7 +48,13 @@ def assemble(
     h = sp.csr_matrix((values, (rows, columns)), shape=(dofs, 3 * len(contacts)))
     w = np.zeros(3 * len(contacts))
     w[0::3] = shift
-    return {"mass": sp.diags(mass).tocsr(), "h": h, "f": mass * velocity.ravel(), "w": w, "mu": np.asarray(mu, dtype=float)}
+    return {
+        "mass": sp.diags(mass).tocsr(),
+        "h": h,
+        "f": mass * velocity.ravel(),
+        "w": w,
+        "mu": np.asarray(mu, dtype=float),
+    }
 
 
 def spheres(seed: int, side: int = 4, *, mu: float = 0.5, mass_ratio: float = 1.0, gravity: float = 1e-2) -> Global:
@@ -66,7 +74,13 @@ def spheres(seed: int, side: int = 4, *, mu: float = 0.5, mass_ratio: float = 1.
                 n = d / np.linalg.norm(d)
                 contacts.append((i, j, -radius[i] * n, radius[j] * n, n))
                 gaps.append(gap)
-        for axis, sign, reach in ((2, 1.0, 0.0), (0, 1.0, 0.0), (1, 1.0, 0.0), (0, -1.0, 2.0 * side + 0.2), (1, -1.0, 2.0 * side + 0.2)):
+        for axis, sign, reach in (
+            (2, 1.0, 0.0),
+            (0, 1.0, 0.0),
+            (1, 1.0, 0.0),
+            (0, -1.0, 2.0 * side + 0.2),
+            (1, -1.0, 2.0 * side + 0.2),
+        ):
             gap = abs(reach - x[i, axis]) - radius[i]
             if gap < 0.02:
                 n = sign * np.eye(3)[axis]
@@ -116,7 +130,7 @@ def natural_maps(delassus: np.ndarray, q: np.ndarray, mu: np.ndarray, r: np.ndar
         for rho in (1.0, 1.0 / delassus[3 * k, 3 * k]):
             z = block - rho * velocity
             size = np.linalg.norm(z[1:])
-            if size <= mu[k] * z[0]:
+            if z[0] >= 0.0 and size <= mu[k] * z[0]:
                 foot = z
             elif z[0] <= -mu[k] * size:
                 foot = np.zeros(3)

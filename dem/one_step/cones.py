@@ -1,8 +1,8 @@
 r"""Nesterov–Todd scaling of the folded problem, contact by contact.
 
-Folded unknowns x ← (μ r_N, r_T), y ← (u_N/μ + ‖u_T‖, u_T) turn both Coulomb cones into the Lorentz cone L = {x₀ ≥ ‖x_T‖}, and the problem
-into L ∋ x ⟂ y ∈ L, y = W̄x + q̄ + ‖y_T‖ e₀. P is the symmetric matrix with P x = P⁻¹ y = λ (Nesterov and Todd 1997). With E = e₀ tᵀ,
-t = ∂‖y_T‖/∂y_T, a Newton step on "residual G, complementarity λ∘λ → v" is
+Folded unknowns x ← (μ r_N, r_T)/c, y ← c (u_N/μ + ‖u_T‖, u_T) turn both Coulomb cones into the Lorentz cone L = {x₀ ≥ ‖x_T‖}, and the
+problem into L ∋ x ⟂ y ∈ L, y = W̄x + q̄ + ‖y_T‖ e₀; c = 1, or √μ for very large μ, whose normal rows would vanish. P is the symmetric matrix
+with P x = P⁻¹ y = λ (Nesterov and Todd 1997). With E = e₀ tᵀ, t = ∂‖y_T‖/∂y_T, a Newton step on "residual G, complementarity λ∘λ → v" is
 
     [W̄ + (I − E) P²] dx = (I − E) P c + G ,   c = λ⁻¹∘v ,   dy = P c − P² dx :
 
@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from ...cache import njit
 from .blocks import Blocks
 
-__all__ = ["Folded", "fold", "follow", "jordan", "longest_step", "right_side", "scale_cones", "to_local", "unfold"]
+__all__ = ["Folded", "follow", "jordan", "longest_step", "right_side", "scale_cones", "to_local", "unfold"]
 
 Array = NDArray[np.float64]
 
@@ -28,9 +28,7 @@ class Folded:
     def __init__(self, blocks: Blocks) -> None:
         n = len(blocks.mu)
         row = np.repeat(np.arange(n), np.diff(blocks.pointer))
-        fold = np.ones((n, 3))
-        fold[:, 0] = 1.0 / blocks.mu
-        self.fold = fold
+        fold = _folds(blocks.mu)
         self.value = blocks.value * fold[row][:, :, None] * fold[blocks.column][:, None, :]
         self.q = blocks.q * fold
         self.root, self.square, self.block = (np.empty((n, 3, 3)) for _ in range(3))
@@ -39,18 +37,14 @@ class Folded:
         self.slip = np.empty(n)
 
 
-def fold(x: Array, mu: Array) -> Array:
-    """(μ r_N, r_T) of r (n, 3)."""
-    out = x.copy()
-    out[:, 0] *= mu
-    return out
-
-
 def unfold(x: Array, mu: Array) -> Array:
-    """r (n, 3) of (μ r_N, r_T)."""
-    out = x.copy()
-    out[:, 0] /= mu
-    return out
+    """r (n, 3) of the folded x."""
+    return x * _folds(mu)
+
+
+def _folds(mu: Array) -> Array:
+    c = np.where(mu > 10.0, np.sqrt(mu), 1.0)
+    return np.column_stack([c / mu, c, c])
 
 
 @njit

@@ -185,11 +185,14 @@ def certify(problem: OneStepProblem, r: Array, *, through: str = "clarabel") -> 
 
 
 def solve_cone_program(blocks: Blocks, monitor: Monitor, *, limit: int = 100_000) -> None:
-    """The fixed point s ← ‖u_T(s)‖ of cone programs (symmetric W only)."""
+    """The fixed point s ← ‖u_T(s)‖ of cone programs. Raises `InputError` for an asymmetric W."""
     program = ConeProgram(monitor.problem)
     s = np.zeros(len(blocks.mu))
     for _ in range(limit):
-        x = program.solve(s)
+        try:
+            x = program.solve(s)
+        except ConvergenceError:  # no optimum: the best iterate stands
+            return
         monitor.factorisations += 1
         if monitor(x):
             return

@@ -38,18 +38,22 @@ def solve_auto(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
         solve_anderson(blocks, monitor)
     if _finished(monitor):
         return None
-    if monitor.tolerance >= _COARSE:
+    if n <= _SMALL and monitor.tolerance >= _COARSE:
         solve_admm(blocks, monitor, limit=400, patience=100)
         if _finished(monitor):
             return None
-    solve_interior(blocks, monitor, limit=150, patience=30)
+    # large packings: the selective damping is the better one; small coupled clusters: the plain one
+    first, second = (
+        (solve_interior, solve_interior_selective) if n <= _SMALL else (solve_interior_selective, solve_interior)
+    )
+    first(blocks, monitor, limit=150, patience=40)
     if _polished(blocks, monitor):
         return None
     proof = find_infeasibility(monitor.problem, time_limit=monitor.time_left)
     if proof is not None or _finished(monitor):
         return proof
     if n > _SMALL:
-        solve_interior_selective(blocks, monitor, limit=150, patience=40)
+        second(blocks, monitor, limit=60, patience=20)
         if _polished(blocks, monitor):
             return None
     for start in (1.0, 10.0, 0.1):

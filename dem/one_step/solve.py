@@ -29,6 +29,7 @@ __all__ = ["SOLVERS", "Solution", "describe", "solve"]
 Array = NDArray[np.float64]
 
 TIME_LIMIT = 60.0  # s
+FINEST = 1e-14  # tolerance
 
 SOLVERS: dict[str, tuple[str, Callable[[Blocks, Monitor], Infeasibility | None]]] = {
     "auto": ("sweeps, interior point, homotopy and polish, as size and progress ask", solve_auto),
@@ -83,8 +84,10 @@ def solve(
     """
     if solver not in SOLVERS:
         raise InputError(f"solver = {solver!r} is unknown: choose one of {', '.join(SOLVERS)}")
-    if not (np.isfinite(tolerance) and tolerance > 0.0):
-        raise InputError(f"tolerance = {tolerance}: it is positive and finite (1e-8 is usual)")
+    if not (np.isfinite(tolerance) and tolerance >= FINEST):
+        raise InputError(
+            f"tolerance = {tolerance}: at least {FINEST:.0e}, below which errors are round-off (1e-8 is usual)"
+        )
     if not time_limit > 0.0:
         raise InputError(f"time_limit = {time_limit} s: it is positive")
     _warm_up()
