@@ -120,9 +120,9 @@ def _program(size: int, places: Any, wanted: Any) -> Any:
     problem = cvxpy.Problem(cvxpy.Maximize(least), constraints)
     try:
         problem.solve(solver=cvxpy.CLARABEL)
-    except cvxpy.error.SolverError:
+    except cvxpy.SolverError:
         return None
-    return gram.value if gram.value is not None and float(least.value) > -1e-6 else None
+    return gram.value if gram.value is not None and problem.value > -1e-6 else None
 
 
 def _positive_semidefinite(rows: list[list[Rational]]) -> bool:

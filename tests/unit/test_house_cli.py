@@ -144,3 +144,43 @@ def test_a_bad_file_is_refused(tmp_path, text):
 def test_a_pair_given_twice_is_refused():
     with pytest.raises(InputError, match="twice"):
         parameter_values(["a=1", "a=2"])
+
+
+def test_check_prints_the_proof_and_its_conditions(capsys):
+    code, out, _ = run(capsys, "check", "cam_clay")
+    assert code == 0
+    assert out.startswith("cam_clay: proved under the conditions:")
+    assert "M**2 > 0" in out and "is a norm" in out and "dissipation: phi + phi_star >= 0 follows" in out
+
+
+def test_check_refutes_with_points_and_exit_one(capsys, tmp_path):
+    file = tmp_path / "mine.py"
+    file.write_text(
+        "from fenchel.potentials import *\n"
+        "from sympy import Abs\n"
+        "eps, p = sym_tensor('eps'), scalar('p')\n"
+        "soft = Law('soft', psi=inner(eps, eps) - p**2, phi_star=indicator(Abs(forces(p)) - 1), observable=eps, internal=(p,))\n"
+        "bad = Law('bad', psi=eps, observable=eps) if soft.name == 'bad' else None\n"
+    )
+    code, out, _ = run(capsys, "check", f"{file}:soft")
+    assert code == 1
+    assert "soft: refuted" in out and "half way between them" in out
+    code, out, _ = run(capsys, "check", f"{file}:soft", "--json")
+    found = json.loads(out)
+    assert code == 1 and found["admissible"] is False and len(found["counterexample"]["points"]) == 3
+    code, out, err = run(capsys, "check", f"{file}:bad")
+    assert code == 2 and out == "" and err.count("\n") == 1
+    file.write_text("from fenchel.potentials import *\nlaw = Law('a b', psi=1)\n")
+    code, out, err = run(capsys, "check", f"{file}:law")
+    assert code == 2 and "name begins with a letter" in err
+
+
+def test_check_decides_the_conditions_by_values(capsys):
+    code, out, _ = run(capsys, "check", "sand", "-p", "H_k=-1")
+    assert code == 1 and "softening: H_k = -1" in out
+    code, out, _ = run(capsys, "check", "sand", "-p", "H_k=1e6", "--json")
+    found = json.loads(out)
+    assert code == 0 and not any("H_k" in c for c in found["conditions"])
+    assert all(row["implied_by_bounds"] for row in found["condition_details"])
+    code, _, err = run(capsys, "check", "sand", "-p", "H_x=1")
+    assert code == 2 and "no parameter 'H_x'" in err
