@@ -11,7 +11,7 @@ from sympy import Expr, S
 
 from ..potentials import Law
 from ..potentials.printer import number_code
-from .coefficients import Numbers, closed_numbers, is_closed, reduced_numbers, strain_numbers
+from .coefficients import Numbers, closed_numbers, is_closed, is_single, reduced_numbers, strain_numbers
 from .plan import STRAIN_START
 from .reduced_structure import Reduction, find_reduction
 from .reduced_text import RATE_TIME, function_text
@@ -64,6 +64,14 @@ def _check_kind(reduction: Reduction, solver: str) -> None:
         raise NoReduction(f"{rule}: phi_star does not depend on principal values; the method for it is 'reduced'")
 
 
+def _method(reduction: Reduction, kind: str) -> str:
+    if kind == "closed":
+        return kind
+    if reduction.affine:
+        return f"{kind} affine"
+    return f"{kind} single" if is_single(reduction) else kind
+
+
 def _affine(numbers: Numbers, reduction: Reduction) -> None:
     for i, f in enumerate(reduction.surfaces):
         rest = f.xreplace(dict.fromkeys(reduction.unknowns, S.Zero))
@@ -99,7 +107,7 @@ def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, funct
         *imports,
         "",
         'FOLDER = __name__.rpartition("_")[2]',
-        f'METHOD = "{method if not reduction.affine or method == "closed" else method + " affine"}"',
+        f'METHOD = "{_method(reduction, method)}"',
         f'WHY = "{WHY[method]}"',
         f"STATE_SIZE = {size}",
         f"VISCOUS = {reduction.finite != 0 or reduction.soft is not None}",

@@ -13,7 +13,7 @@ from . import plan
 from .reduced_structure import Q, Reduction, is_curved
 from .structure import internal_scalars, internal_tensors, state_layout
 
-__all__ = ["Numbers", "closed_numbers", "is_closed", "reduced_numbers", "strain_numbers"]
+__all__ = ["Numbers", "closed_numbers", "is_closed", "is_single", "reduced_numbers", "strain_numbers"]
 
 Group = tuple[str, list[Expr]]
 
@@ -41,6 +41,15 @@ class Numbers:
 def is_closed(reduction: Reduction) -> bool:
     """True if the step has the closed form: at most one surface, affine, in one norm, traces and scalars."""
     return reduction.kind == "norm" and reduction.affine and len(reduction.surfaces) <= 1
+
+
+def is_single(reduction: Reduction) -> bool:
+    """True if the projection has one function and a diagonal metric: what `reduced_single` takes."""
+    if reduction.kind != "norm" or len(reduction.functions) != 1:
+        return False
+    block, place = reduction.moduli.scalar_block, {s: j for j, s in enumerate(internal_scalars(reduction.law))}
+    coupled = any(block[place[s]][place[r]] != 0 for s in reduction.scalars for r in reduction.scalars if s != r)
+    return len(reduction.traces) <= 1 and not coupled
 
 
 def _combined(weights: tuple[Expr, ...], values: list[Expr]) -> Expr:

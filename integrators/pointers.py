@@ -15,6 +15,7 @@ from .kernel_types import no_law, no_method
 from .plan import KIND, LINES, METHOD_START, METRIC, ORDERS, SURFACES, UNKNOWNS
 from .reduced_affine import affine_method, face_table
 from .reduced_projection import projection_method
+from .reduced_single import single_method
 from .reduced_step import reduced_step
 from .strain_terms import unilateral_terms
 
@@ -96,4 +97,5 @@ def step_pointers(module: ModuleType) -> StepPointers:
     if method.endswith("affine"):
         plan[METHOD_START] = module.SIZE
         return StepPointers(reduced_step(), affine_method(), no_law(), rest, plan, module.coefficients_, True)
-    return StepPointers(reduced_step(), projection_method(), module.functions_, rest, plan, module.coefficients_, False)
+    chosen = single_method() if method.endswith("single") else projection_method()
+    return StepPointers(reduced_step(), chosen, module.functions_, rest, plan, module.coefficients_, False)

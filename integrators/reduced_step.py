@@ -231,7 +231,7 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
             if plan[KIND] == 0:
                 if plan[NORM] > 0:
                     q = trial[i, 0]
-                    slip = f[0] / q if f[0] < 1e280 * q else f[2 * n]
+                    slip = f[0] / q if abs(f[0]) < 1e280 * q else f[2 * n]
                 for j in range(6):
                     flow[j] = slip * b[i, j]
             else:

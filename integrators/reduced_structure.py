@@ -87,8 +87,9 @@ class Reduction:
 
     @cached_property
     def functions(self) -> tuple[Expr, ...]:
-        """The function of the power terms, if any, then the surfaces."""
-        return ((self.soft.function,) if self.soft is not None else ()) + self.surfaces
+        """The function of the power terms, if any, then the surfaces; of a law with neither, one that is never met."""
+        found = ((self.soft.function,) if self.soft is not None else ()) + self.surfaces
+        return found or (S.NegativeOne,)
 
     @cached_property
     def affine(self) -> bool:
