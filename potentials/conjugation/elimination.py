@@ -7,7 +7,6 @@ increasingly takes its largest lower bound; b γ + a γ^(−q) has its minimum w
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import reduce
 from typing import Any
 
 from sympy import Add, Expr, Mul, Pow, S, default_sort_key, log, powsimp, solve
@@ -263,7 +262,7 @@ def _bounded_both_ways(form: MinForm, unknown: Multiplier) -> MinForm | None:
     if (falling and not upper) or (not falling and not lower):
         return None
     # κ ≤ −u for the upper bounds: the least of them is minus the largest u
-    solution = -reduce(Maximum, upper) if falling else reduce(Maximum, lower)
+    solution = -_greatest(upper) if falling else _greatest(lower)
     table = {unknown: solution}
     crossed = tuple(a + b for a in lower for b in upper)
     return replace(
@@ -286,7 +285,7 @@ def _stationary(form: MinForm, unknown: Multiplier, bounds: list[Expr], others: 
         return None
     if len(found) != 1 or _has_duals(found[0]) or found[0].has(Multiplier):
         return None
-    table = {unknown: reduce(Maximum, bounds, found[0])}
+    table = {unknown: _greatest([found[0], *bounds])}
     return replace(
         form,
         value=substituted(form.value, table),
@@ -359,10 +358,15 @@ def _largest(bounds: list[Expr]) -> Expr:
     unique = sorted(dict.fromkeys(bounds), key=default_sort_key)
     if not unique:
         return S.Zero
-    found: Any = unique[0]
-    for other in unique[1:]:
-        found = Maximum(found, other)
+    found = _greatest(unique)
     return found if any(_is_length(b) for b in unique) else PositivePart(found)
+
+
+def _greatest(values: list[Expr]) -> Any:
+    found: Any = values[0]
+    for other in values[1:]:
+        found = Maximum(found, other)
+    return found
 
 
 def _is_length(bound: Expr) -> bool:

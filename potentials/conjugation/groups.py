@@ -205,12 +205,8 @@ class EigenGroup:
     def conjugate(self, duals: dict[Any, Any]) -> MinForm:
         Z, equalities = self.dual(duals)
         shift = opened(self.shifted(Z))
-        if self.function == 0:
-            found = self._extreme(Z)
-        elif self.top == 0 and self.low == 0:
-            found = conjugate_of_eigenvalues(self.function, E, Z)
-        else:
-            raise NoRule("no conjugate is known for a function of all eigenvalues together with an extreme eigenvalue")
+        # the terms of a group are either extreme eigenvalues or functions of all of them
+        found = self._extreme(Z) if self.function == 0 else conjugate_of_eigenvalues(self.function, E, Z)
         return MinForm(
             found.value + shift,
             found.inequalities,

@@ -212,6 +212,7 @@ class _Supremum:
             return NumericalConjugate(-float(ends[0]), self._unpacked(np.zeros(self.size)), 0.0)
         data, chain, _ = problem.get_problem_data(cvxpy.CLARABEL)
         options = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
+        assert chain is not None
         raw = chain.solve_via_data(problem, data, solver_opts=options)
         status = str(raw.status)
         if "DualInfeasible" in status:

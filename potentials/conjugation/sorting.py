@@ -211,12 +211,15 @@ class Sorter:
             parts = Parts({s: (c + d, S.Zero) for s, (c, d) in parts.linear.items()}, parts.rest)
             leaf = type(leaf)(from_terms({s: c for s, (c, _) in parts.linear.items()}) + parts.rest)
         self.require(-weight if isinstance(leaf, EigMinLeaf) else weight, leaf)
+        extreme = isinstance(leaf, (EigMaxLeaf, EigMinLeaf))
         for group in self.eigen:
+            if extreme is not (group.function == 0):
+                continue  # extreme eigenvalues and sums over all of them share the dual
             ratio = _ratio(group.parts, parts)
             if ratio == 1:
                 group.add(leaf, weight)
                 return
-            if ratio == -1 and isinstance(leaf, (EigMaxLeaf, EigMinLeaf)):
+            if ratio == -1 and extreme:
                 other = EigMinLeaf if isinstance(leaf, EigMaxLeaf) else EigMaxLeaf
                 group.add(other(leaf.args[0]), -weight)
                 return
