@@ -26,7 +26,7 @@ STEPS = 60
 
 @dataclass
 class BatchSolution:
-    """Unknowns `y` (N, n) and `multipliers` (N, m), `slopes` ∂W/∂d (N, D), `tangent` (N, 6, 6) or None, relative `residual`, engine codes."""
+    """Unknowns `y` (N, n), `multipliers` (N, m), `slopes` ∂W/∂d (N, D), `tangent` (N, 6, 6) or None, relative `residual`, codes."""
 
     y: Array
     multipliers: Array
@@ -82,7 +82,7 @@ def solve_batch(
     """
     small = program.compact.program
     found = run_engine(small, data, tangent=tangent, tolerance=tolerance, start=start)
-    for tau in (1e3, 1.0):
+    for tau in (100.0, 0.3, 1e3):
         left = np.flatnonzero(found.status > ROUNDING)
         if left.size == 0:
             return found

@@ -38,15 +38,22 @@ def solution_gap(solution: StepSolution, count: int) -> Array:
 
 
 def natural_map(part: Part) -> Array:
-    """Largest entry of (Py + q + Gᵀλ, λ − Π_{K*}(λ − s)) per point, relative to the size of (q, h); of a scalar term λ + g′(s)."""
-    program, y, multipliers, q, h, s = _arrays(part)
+    """Largest entry of (Py + q + Gᵀλ, λ − Π_{K*}(λ − s)) per point, of a scalar term λ + g′(s), relative to the size that
+    the data give to (q, h) before anything cancels."""
+    program, y, multipliers, q, _, s = _arrays(part)
     stationary = y * program.p + q + multipliers @ program.G
     feasible = multipliers - dual_projection(program, multipliers - s)
     for cone, place in _terms(program):
         slack, multiplier = s[:, place], multipliers[:, place]
-        # where λ is steep in s, the mismatch is counted in s
-        feasible[:, place] = slack - _inverse_slope(cone, multiplier, slack)
-    size = np.maximum(np.abs(q).max(axis=1, initial=0.0), np.abs(h).max(axis=1, initial=0.0))
+        # the natural map of a scalar term is at most the smaller of the mismatches in s and in λ
+        in_slack = np.abs(slack - _inverse_slope(cone, multiplier, slack))
+        in_slope = np.abs(multiplier + _slope(cone, slack))
+        feasible[:, place] = np.fmin(in_slack, in_slope)
+    given = np.abs(part.data)
+    size = np.maximum(
+        (np.abs(program.q0) + given @ np.abs(program.q1).T).max(axis=1, initial=0.0),
+        (np.abs(program.h0) + given @ np.abs(program.h1).T).max(axis=1, initial=0.0),
+    )
     found = np.maximum(np.abs(stationary).max(axis=1, initial=0.0), np.abs(feasible).max(axis=1, initial=0.0))
     return found / np.where(size > 0.0, size, 1.0)
 
@@ -169,6 +176,17 @@ def _term_value(cone: Any, slack: Array) -> Array:
             r = np.maximum(-slack, 0.0)
             return c * np.where(r > 0.0, r * (np.log(r / k) - 1.0), 0.0)
         return -c * np.log(slack)
+
+
+def _slope(cone: Any, slack: Array) -> Array:
+    """g′(s)."""
+    c, k = cone.alpha, cone.beta
+    with np.errstate(all="ignore"):
+        if cone.kind == POWER_TERM:
+            return c * k * np.sign(slack) * np.abs(slack) ** (k - 1.0)
+        if cone.kind == EXPONENTIAL_TERM:
+            return c / k * np.exp(slack / k)
+        return -c * np.log(-slack / k) if cone.kind == ENTROPY_TERM else -c / slack
 
 
 def _inverse_slope(cone: Any, multiplier: Array, slack: Array) -> Array:

@@ -245,9 +245,10 @@ def power(x, y, z, alpha, jacobian):
     """Projection of (x, y, z) on the power cone; returns (kind, x, y, z), kind 0 zero, 1 identity, 2 mixed."""
     beta = 1.0 - alpha
     size = abs(z)
-    if x >= 0.0 and y >= 0.0:
-        if size == 0.0 or (x > 0.0 and y > 0.0 and alpha * math.log(x) + beta * math.log(y) >= math.log(size)):
-            return 1, x, y, z
+    if size == 0.0 and x >= 0.0 and y >= 0.0:
+        return 1, x, y, z
+    if x > 0.0 and y > 0.0 and alpha * math.log(x) + beta * math.log(y) >= math.log(size):
+        return 1, x, y, z
     if x <= 0.0 and y <= 0.0:
         if size == 0.0:
             return 0, 0.0, 0.0, 0.0
@@ -324,7 +325,7 @@ def project(kind, alpha, v, start, size, out, jacobian, work):
         found, a, b, c = exponential(-x, -y, -z, jacobian)
     else:
         found, a, b, c = power(-x, -y, -z, alpha, jacobian)
-    if kind == EXPONENTIAL_DUAL or kind == POWER_DUAL:
+    if kind in (EXPONENTIAL_DUAL, POWER_DUAL):
         out[start], out[start + 1], out[start + 2] = a, b, c
         return found
     if found == 0:

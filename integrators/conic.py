@@ -42,7 +42,7 @@ class ConicSolution:
 
 @dataclass(frozen=True)
 class ConicStep:
-    """The program of one step at one point; `.problem` is the cvxpy problem, its unknowns divided by `size`, strains also by `strain_unit`."""
+    """The program of one step at one point; `.problem` is the cvxpy problem, unknowns divided by `size`, strains by `strain_unit` too."""
 
     law: Law
     update: Any

@@ -1,7 +1,7 @@
 """A law's step as expressions: ψ, the finite part and the surfaces of its force function, and which data enter them.
 
-State frozen at the start of the step and the temperature are data of a point, not of the law. Every largest subexpression made of parameters
-and such data, k(θ), is replaced by a coefficient symbol, so that what varies from point to point is a short list of numbers.
+State frozen at the start of the step and the temperature are data of a point, not of the law. Every largest subexpression made of
+parameters and such data, k(θ), is replaced by a coefficient symbol, so that what varies from point to point is a short list of numbers.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from ..potentials.ranked import Ranked
 from ..potentials.scalars import ScalarVariable, Temperature
 from ..potentials.tensor import TensorSymbol
 from ..potentials.vector import VectorSymbol
+from .strain_energy import StrainEnergy, without_strain_terms
 
 __all__ = ["DeclaredStep", "components", "declared_step", "packed_layout", "strain_flows"]
 
@@ -55,11 +56,12 @@ def strain_flows(law: Law) -> bool:
 
 @dataclass(frozen=True)
 class DeclaredStep:
-    """Expressions with coefficient symbols; `coefficients` maps each symbol to its expression in parameters, T and frozen state,
-    `frozen` lists the frozen tensors and vectors, which stay in the expressions as they are."""
+    """Expressions with coefficient symbols, and the terms of ψ in the strain alone; `coefficients` maps each symbol to its expression in
+    parameters, T and frozen state; `frozen` lists the frozen tensors and vectors, which stay in the expressions as they are."""
 
     law: Law
     energy: Expr
+    strain_energy: StrainEnergy
     finite: Expr
     surfaces: tuple[Expr, ...]
     word: str
@@ -105,8 +107,11 @@ class DeclaredStep:
         return found
 
 
-def declared_step(law: Law) -> DeclaredStep:
-    """Take the law apart. Raises `DeclarationError` where its energy is not known or ∇T is coupled to other forces."""
+def declared_step(law: Law, *, whole: bool = False) -> DeclaredStep:
+    """Take the law apart; terms of ψ in the strain alone are set aside unless `whole`.
+
+    Raises `DeclarationError` where its energy is not known or ∇T is coupled to other forces.
+    """
     potential = law.phi if law.phi is not None else law.phi_star
     word = "phi" if law.phi is not None else "phi_star"
     finite: Expr = S.Zero
@@ -115,12 +120,14 @@ def declared_step(law: Law) -> DeclaredStep:
         surfaces = [f for f in potential.surfaces if not _thermal(law, word, f)]
         finite = Add(*(t for t in Add.make_args(potential.finite) if not _thermal(law, word, t)))
     gathering = _Gathering()
-    energy = gathering.expression(law.energy)
+    energy, alone = (law.energy, S.Zero) if whole else without_strain_terms(law.energy, law.observable)
+    energy = gathering.expression(energy)
     finite = gathering.expression(finite)
     found = tuple(gathering.expression(f) for f in surfaces)
     frozen = {s for e in (finite, *found) for s in _frozen_in(e) if isinstance(s, Ranked)}
     names = {symbol: expression for expression, symbol in gathering.found.items()}
-    return DeclaredStep(law, energy, finite, found, word, names, tuple(sorted(frozen, key=str)))
+    outside = StrainEnergy(alone, law.observable)
+    return DeclaredStep(law, energy, outside, finite, found, word, names, tuple(sorted(frozen, key=str)))
 
 
 class _Gathering:

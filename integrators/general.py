@@ -281,15 +281,16 @@ def _solve_point(
             for i in range(n):
                 y[i] = trial[i]
         # residuals at (y, w): stationarity without the proximal term, and feasibility with complementarity |w − λ|/τ
-        stationary, feasible, scale = 0.0, 0.0, 0.0
+        stationary, feasible, scale, reach = 0.0, 0.0, 0.0, 0.0
         for i in range(n):
             step = rho * (y[i] - y0[i]) if p[i] < 0.5 else 0.0
             stationary = max(stationary, abs(slope[i] - step))
-            scale = max(scale, abs(y[i]))
+            reach = max(reach, abs(y[i]))
         for r in range(m):
             feasible = max(feasible, abs(w[r] - lam[r]) / tau)
             scale = max(scale, abs(w[r]))
             lam[r] = w[r]
+        scale = max(scale, reach)
         residual = max(stationary, feasible)
         if not residual < math.inf:
             return NOT_FINITE, residual, steps, tau, rho
@@ -302,11 +303,15 @@ def _solve_point(
         stalled = stalled + 1 if residual > 0.5 * best else 0
         if stalled > 8:
             break
-        if residual > 0.05 * best or residual > 1e-3:
+        # rounding of Gy − h reaches the multipliers τ times enlarged: no residual below it can be asked of this penalty
+        noise = 4.0 * _EPS * (1.0 + scale + tau * reach)
+        if residual <= 8.0 * noise and tau > 1.0:
+            tau = max(0.01 * tau, 1.0)
+        elif residual > 0.05 * best or residual > 1e-3:
             tau = min(10.0 * tau, highest)
             rho = max(0.1 * rho, 1e-7)
         best = min(best, residual)
-        inner = max(min(0.1 * residual, 1e-2), 4.0 * _EPS * (1.0 + scale))
+        inner = max(min(0.1 * residual, 1e-2), 4.0 * _EPS * (1.0 + scale + tau * reach))
     return status, residual, steps, tau, rho
 
 
@@ -433,6 +438,8 @@ def solve_points(
                 value -= h1[r, k] * l_all[point, r]
             slopes[point, k] = value
         if want_tangent:
+            # a stiff penalty lets the iteration of the tangent converge in a few turns
+            tau, rho = 1e4, 1e-6
             for r in range(m):
                 value = -h[r]
                 for j in range(n):

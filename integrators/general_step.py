@@ -25,6 +25,7 @@ __all__ = ["GeneralStep", "Part", "StepSolution"]
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-13
+NOISE = 1e-13
 
 
 @dataclass(frozen=True)
@@ -156,7 +157,7 @@ class GeneralStep:
         tolerance: float = TOLERANCE,
         start: StepSolution | None = None,
     ) -> StepSolution:
-        """The step at every point, (n, 6) strains and (n, …) packed old states; `method` "general", or "conic": polish of clarabel's answer.
+        """The step at every point, (n, 6) strains, (n, …) packed old states; `method` "general", or "conic" to polish clarabel's answer.
 
         `start`, an earlier solution at the same number of points and groups, warms the engine.
         """
@@ -178,13 +179,26 @@ class GeneralStep:
                 warm, _ = interior_start(program, data)
             found = solve_batch(program, data, tangent=tangent, tolerance=tolerance, start=warm)
             slopes[points] = found.slopes[:, :width]
-            increment[points] = program.compact.program.increments(data, found.y)
+            increment[points] = _increments(program.compact.program, data, found.y)
             if tangents is not None and found.tangent is not None:
                 tangents[points] = found.tangent
             residual[points], counts[points] = found.residual, found.counts
             status[points] = _codes(program, data, found)
             parts.append(Part(points, program, data, found))
+        known: dict[Any, Any] = {**self.parameters, self.law.observable: eps}
+        if temperature is not None:
+            known[self.law.temperature] = temperature
+        self.declared.strain_energy.add(slopes[:, :6], tangents, known)
         return StepSolution(slopes, tangents, increment, residual, status, counts, parts)
+
+
+def _increments(program: StepProgram, data: Array, y: Array) -> Array:
+    """X − X_n; what is below the rounding of the step is zero, so that an elastic step leaves the state as it was."""
+    found = program.increments(data, y)
+    q, h = program.q0 + data @ program.q1.T, program.h0 + data @ program.h1.T
+    size = np.maximum(np.abs(q).max(axis=1, initial=0.0), np.abs(h).max(axis=1, initial=0.0))
+    noise = NOISE * size[:, None] * np.abs(program.increment_y).sum(axis=1)
+    return np.where(np.abs(found) <= noise, 0.0, found)
 
 
 def _codes(program: StepProgram, data: Array, found: BatchSolution) -> NDArray[np.int64]:

@@ -42,7 +42,7 @@ class GeneralUpdate:
     @classmethod
     def of(cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "") -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
-        found = cls(law, StatePacking.of(law), declared_step(law), tangent, solver, why)
+        found = cls(law, StatePacking.of(law), declared_step(law, whole=solver != "general"), tangent, solver, why)
         found._rehearse()
         return found
 

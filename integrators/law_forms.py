@@ -22,7 +22,7 @@ __all__ = ["LawForms", "law_forms"]
 
 @dataclass(frozen=True)
 class LawForms:
-    """`energy` over (ε, X, aux); `flow` over (Y, aux) if `dual`, else over (rates, aux), on the places `moved` of (ε, X); None if elastic."""
+    """`energy` over (ε, X, aux); `flow` (None if elastic) over (Y, aux) if `dual`, else (rates, aux), on the places `moved` of (ε, X)."""
 
     energy: CanonicalForm
     flow: CanonicalForm | None

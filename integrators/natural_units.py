@@ -37,8 +37,11 @@ class NaturalUnits:
     unbounded: bool
 
 
-def natural_units(N: Array, P: Array, G: Array, h: Array, slopes: Array, cones: Sequence[Cone]) -> NaturalUnits:
-    """Units for x in the span of the orthonormal columns of `N`; `slopes` (n, ·): first the constant linear term, then those by the data."""
+def natural_units(
+    N: Array, costed: Array, P: Array, G: Array, h: Array, slopes: Array, cones: Sequence[Cone]
+) -> NaturalUnits:
+    """Units for x in the span of the orthonormal columns of `N` and of the unit columns `costed`, unknowns that meet one entry of an
+    exponential or power cone and nothing else; `slopes` (n, ·): first the constant linear term, then those by the data."""
     P = N.T @ P @ N
     values, vectors = np.linalg.eigh(0.5 * (P + P.T)) if P.size else (np.zeros(0), np.zeros((0, 0)))
     strong = values > CURVED * max(float(values.max(initial=0.0)), 1e-300)
@@ -65,9 +68,10 @@ def natural_units(N: Array, P: Array, G: Array, h: Array, slopes: Array, cones: 
         blocks = np.where(blocks > 0.0, blocks, _block_norms(G @ measured, cones))
     blocks[blocks == 0.0] = 1.0
     # the rest meets exponential and power cones only
-    _balance(blocks, cones, G, h, measured, free, slopes[:, 0])
+    _balance(blocks, cones, G, h, np.hstack([measured, free]), costed, slopes[:, 0])
     last, free = _normalised(G / blocks[:, None], free)
-    measured = np.hstack([measured, last])
+    images = np.abs(G / blocks[:, None] @ costed).max(axis=0, initial=0.0)
+    measured = np.hstack([measured, last, costed / images])
     pull = free.T @ slopes
     return NaturalUnits(
         measured,

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .canonical import CanonicalForm, Cone, dual_cones
+from .cone_projection import SEMIDEFINITE
 from .natural_units import cleaned, natural_units
 
 __all__ = ["FlowForm", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates"]
@@ -214,6 +215,22 @@ def _column_scale(P: Array, E: Array, G: Array) -> Array:
     return scale
 
 
+def _costed(P: Array, E: Array, G: Array, cones: tuple[Cone, ...]) -> NDArray[np.bool_]:
+    """Unknowns that meet one entry of an exponential or power cone and nothing else: they only carry a cost."""
+    single = (np.count_nonzero(G, axis=0) == 1) & ~P.any(axis=0) & ~E.any(axis=0)
+    flat = np.concatenate([np.full(c.size, c.kind > SEMIDEFINITE) for c in cones]) if cones else np.zeros(0, dtype=bool)
+    return single & (flat[np.abs(G).argmax(axis=0)] if flat.size else False)
+
+
+def _outside(basis: Array, taken: NDArray[np.bool_]) -> Array:
+    """Orthonormal basis of what the columns of `basis` span without the unit vectors `taken`."""
+    if not taken.any():
+        return basis
+    rest = np.where(taken[:, None], 0.0, basis)
+    u, s, _ = np.linalg.svd(rest, full_matrices=False)
+    return u[:, s > 0.5]
+
+
 def _reduce(
     full: Array, E: Array, G: Array, H: Array, cones: tuple[Cone, ...], X: Array, width: int, m: int, strain_flows: bool
 ) -> StepProgram:
@@ -227,11 +244,13 @@ def _reduce(
     G = G * scale
     sizes = np.linalg.norm(E[:, k:], axis=1)
     E = E / np.where(sizes > 0.0, sizes, 1.0)[:, None]
-    u, s, vt = np.linalg.svd(E[:, k:]) if E.size else (np.zeros((0, 0)), np.zeros(0), np.eye(n))
+    costed = _costed(full[k:, k:], E[:, k:], G, cones)
+    E_rest = np.where(costed, 0.0, E[:, k:])
+    u, s, vt = np.linalg.svd(E_rest) if E.size else (np.zeros((0, 0)), np.zeros(0), np.eye(n))
     rank = int((s > RANK * s.max(initial=0.0)).sum())
     misfit = u[:, rank:].T @ E[:, :k] if E.size else np.zeros((0, k))
     misfit = misfit[np.abs(misfit).max(axis=1, initial=0.0) > 1e-12]
-    N = cleaned(vt[rank:].T)
+    N = cleaned(_outside(vt[rank:].T, costed))
     # x = S (1, d) + x', x' in the span of N
     S = -(vt[:rank].T / s[:rank]) @ (u[:, :rank].T @ E[:, :k]) if rank else np.zeros((n, k))
     S[np.abs(S) < 1e-15 * np.abs(S).max(initial=0.0)] = 0.0
@@ -239,7 +258,7 @@ def _reduce(
     full = whole.T @ full @ whole
     X = X @ whole
     H = H - G @ S
-    units = natural_units(N, full[k:, k:], G, H[:, 0], full[k:, :k], cones)
+    units = natural_units(N, np.eye(n)[:, costed], full[k:, k:], G, H[:, 0], full[k:, :k], cones)
     T, blocks = units.columns, units.rows
     G, H = G @ T / blocks[:, None], H / blocks[:, None]
     linear = T.T @ full[k:, :k]
