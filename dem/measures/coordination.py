@@ -1,9 +1,9 @@
 r"""Coordination: contacts per body, with and without rattlers, and the surplus of contacts over degrees of freedom.
 
-Z = (2 N_c + N_w)/N: a contact between bodies counts for both, one with a wall for its body. Rattlers carry no force network: bodies with
-fewer than `least` contacts, taken out again and again until none is left (what remains is the core of that order of the contact graph).
-A frictionless body at rest needs d + 1 contacts, a frictional one d. A frictionless packing at jamming is isostatic: as many
-contacts as degrees of freedom, d per body that is no rattler, so Z → 2d far from walls.
+Z = (2 N_c + N_w)/N: a contact between bodies counts for both, one with a wall for its body. Rattlers carry no force network: bodies
+with fewer than `least` contacts, taken out again and again until none is left (what remains is the core of that order of the contact
+graph). A body between frictionless contacts needs d + 1 of them, with friction two can hold it: that is the default. A frictionless
+packing at jamming is isostatic: as many contacts as degrees of freedom, d per body that is no rattler, so Z → 2d far from walls.
 
 Moukarzel (1998), PRL 81, 1634; O'Hern et al. (2003), PRE 68, 011306; Agnolin and Roux (2007), PRE 76, 061302.
 """
@@ -48,11 +48,12 @@ def _degrees(network: Network, edges: NDArray[np.int64], kept: NDArray[np.bool_]
 
 
 def rattlers(network: Network, *, least: int | None = None) -> NDArray[np.bool_]:
-    """(n,) True for bodies outside the core in which everybody has `least` contacts (default d + 1); taut links hold a bead, too.
+    """(n,) True for bodies outside the core in which everybody has `least` contacts; taut links hold a bead, too.
 
-    Fixed bodies never rattle.
+    Default: 2, or d + 1 in a sample without friction. Fixed bodies never rattle.
     """
-    least = network.dimension + 1 if least is None else least
+    if least is None:
+        least = network.dimension + 1 if len(network.pair) and not network.friction.any() else 2
     if least < 1:
         raise InputError(f"least = {least}: a body without contact rattles, least is 1 or more")
     edges = _edges(network, links=True)

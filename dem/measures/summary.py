@@ -26,7 +26,7 @@ SUMMARY = {  # unit and meaning of what `summary` returns
     "link_pushing": ("1", "links under compression (rods)"),
     "coordination": ("1", "contacts per grain, walls counted"),
     "coordination_core": ("1", "the same without rattlers"),
-    "rattlers": ("1", "share of grains with fewer than d + 1 contacts, again and again"),
+    "rattlers": ("1", "share of grains with fewer than two contacts (d + 1 without friction), again and again"),
     "coordination_beads": ("1", "contacts per bead, links not counted"),
     "sliding": ("1", "share of frictional contacts at the Coulomb limit, within 1e-6 of it"),
     "sliding_grain_bead": ("1", "the same among contacts of grains with beads"),

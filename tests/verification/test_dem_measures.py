@@ -298,6 +298,17 @@ def test_rattlers_are_what_the_largest_core_leaves() -> None:
         assert found.surplus == inside + on_wall - 3 * len(kept)
 
 
+def test_two_contacts_hold_with_friction_and_d_plus_one_without() -> None:
+    """A grain on two others, all of them between walls: with friction an arch, without it the keystone slips through in space."""
+    x = np.array([[-0.9, 0.0, 0.0], [0.9, 0.0, 0.0], [0.0, 0.0, np.sqrt(1 - 0.81)]])
+    wall = np.array([[0, 0], [0, 2], [0, 4], [1, 1], [1, 2], [1, 4]])
+    arch = replace(touching(x, 0.5), wall=wall)
+    assert not rattlers(arch).any()
+    smooth = replace(arch, friction=np.zeros(2))
+    assert rattlers(smooth).tolist() == [True, True, True]  # without the keystone the others have three contacts only
+    assert rattlers(smooth, least=3).tolist() == [False, False, True]
+
+
 def test_a_bead_is_held_by_taut_links_and_a_fixed_body_never_rattles() -> None:
     walks = np.array([[[0.0, 0, 0], [1.0, 0, 0], [2.0, 0, 0]]])
     taut = wires_of(walks, np.array([[1.0, 1.0]]))
