@@ -42,6 +42,11 @@ def _large(prover: Prover, node: Any) -> Proof | None:
             return (inside + positive + order).step(
                 f"{node} is convex: a power of order at least one of a {word} function"
             )
+    if exponent.is_integer is not True and prover.affine(base):
+        # an exponent that need not be whole is a real power, which is not defined where the base is negative
+        from .convexity import Proof
+
+        return (order + Proof(domain=(base,))).step(f"{node} is convex where it is defined: a power of order at least one")
     return None
 
 
