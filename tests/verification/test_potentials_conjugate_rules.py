@@ -27,6 +27,7 @@ from fenchel.potentials import (
     tr,
     vector,
 )
+from fenchel.potentials.atoms import atom_of
 from fenchel.potentials.derivative import partial
 from fenchel.potentials.evaluate import evaluate
 from fenchel.potentials.extended import as_extended
@@ -418,6 +419,39 @@ def test_functions_of_the_eigenvalues():
         y = np.array([m[0, 0], m[1, 1], m[2, 2], *(np.sqrt(2) * m[i, j] for i, j in ((1, 2), (0, 2), (0, 1)))])
         expected = sum((e * grid - numbers).max() for e in eigenvalues)
         assert value_of(conjugate, {x: y}) == pytest.approx(expected, abs=1e-6)
+
+
+ATOMS_ALONE = {
+    "trace": (tr(x), x, 1),
+    "square": (inner(x, x), x, 1),
+    "norm": (norm(x), x, 1),
+    "positive square": (inner(pos(x), pos(x)), x, 1),
+    "positive trace": (tr(pos(x)), x, 1),
+    "largest eigenvalue": (eig_max(x), x, 1),
+    "smallest eigenvalue": (eig_min(x), x, -1),
+    "sum over eigenvalues": (eig_sum(lambda t: t**4, x), x, 1),
+    "positive part": (pos(p), p, 1),
+    "even power": (p**4, p, 1),
+    "root": (sqrt(p), p, -1),
+    "inverse": (1 / p, p, 1),
+    "exponential": (exp(p), p, 1),
+    "logarithm": (log(p), p, -1),
+}
+
+
+@pytest.mark.parametrize("name", ATOMS_ALONE)
+def test_an_atom_knows_its_conjugate(name):
+    """f + f* = x·y at y = ∇f(x), inside the domain; of a concave atom, for its negative."""
+    node, symbol, sign = ATOMS_ALONE[name]
+    rng = np.random.default_rng(13)
+    dual = sym_tensor("y_0") if symbol is x else scalar("y_0")
+    value, domain = atom_of(node).conjugate(node, dual)
+    for _ in range(5):
+        z = rng.normal(size=6) if symbol is x else 0.1 + abs(rng.normal())
+        y = sign * evaluate(partial(node, symbol), {symbol: z})
+        star = float(evaluate(value, {dual: y}))
+        assert star + sign * float(evaluate(node, {symbol: z})) == pytest.approx(float(np.dot(y, z)), abs=1e-10)
+        assert all(float(evaluate(f, {dual: y})) <= 1e-9 for f in domain)
 
 
 def test_what_is_not_convex_has_no_rule():
