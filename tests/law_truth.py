@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from types import SimpleNamespace
 from typing import Any
 
@@ -191,7 +191,6 @@ class Truth:
     finite: Function | None = None
     plastic: str | None = "eps_p"
     thermal: bool = False
-    observable_force: bool = field(default=False)
 
     def energy(self, v, x):
         """ψ [J/m³]; x holds eps, the internal variables and T by name."""

@@ -160,7 +160,7 @@ def test_claim_05_conjugates_by_rule_and_by_number_are_the_written_ones(name):
         assert rule.value(table | {dual: outside[None]})[0] == np.inf
 
 
-def singular_values_of(s):
+def eigenvalues_of(s):
     return np.linalg.eigvalsh(matrix(s))
 
 
@@ -184,7 +184,7 @@ KINKED = {
     ),
     "trace of the positive part and square": (
         E_ * inner(e, e) + C_ * tr(pos(e)),
-        lambda s, G, c: ((w := singular_values_of(s)) - np.clip(w, 0, c)) @ (w - np.clip(w, 0, c)) / (4 * G),
+        lambda s, G, c: ((w := eigenvalues_of(s)) - np.clip(w, 0, c)) @ (w - np.clip(w, 0, c)) / (4 * G),
     ),
     "power of a norm": (
         C_ * norm(e) ** 3,
