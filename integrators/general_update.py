@@ -20,6 +20,7 @@ from ..potentials.evaluate import evaluate
 from .declared import DeclaredStep, components, declared_step
 from .general_step import GeneralStep, StepSolution
 from .packing import StatePacking
+from .thermal import thermal_input, thermal_results
 
 __all__ = ["GeneralUpdate"]
 
@@ -69,7 +70,7 @@ class GeneralUpdate:
         certify: bool = False,
         **values: Any,
     ) -> Any:
-        """See `Update.__call__`; the temperature, where the law mentions one, is given under its own name, a number or (n,).
+        """See `Update.__call__`.
 
         Raises `InputError` for bad input, for values at which ψ or φ* is not convex and where f(0) > 0, and `ConvergenceError`, naming the
         first points, where the step has no solution or none is found.
@@ -78,7 +79,9 @@ class GeneralUpdate:
 
         eps = strain_array(eps_new)
         old = self.packing.pack(state, len(eps))
-        numbers, temperature = self.arguments(values, len(eps))
+        heat, given = thermal_input(self.law, values, len(eps))
+        numbers = self.law.admissible_values(given)
+        temperature = heat.temperature if self.law.temperature is not None else None
         found, gap = self.solve(eps, old, dt, numbers, temperature), None
         raise_failures(found.status, eps)
         new, lost = self.outcome(eps, old, found)
@@ -86,24 +89,15 @@ class GeneralUpdate:
             from .certificate import solution_gap
 
             gap = solution_gap(found, len(eps))
-        return StepResult(found.slopes[:, :6].copy(), found.tangent, self.packing.unpack(new), lost, found.status, gap)
+        named = self.packing.unpack(new)
+        entropy, flux = thermal_results(self.law, heat, eps, named, given)
+        stress = found.slopes[:, :6].copy()
+        return StepResult(stress, found.tangent, named, lost, found.status, gap, entropy, flux)
 
     def arguments(self, values: Mapping[str, Any], count: int) -> tuple[dict[str, float], Array | None]:
         """Checked parameters by name, and the temperature at every point."""
-        given = dict(values)
-        temperature = None
-        if self.law.temperature is not None:
-            name = self.law.temperature.name
-            if name not in given:
-                raise InputError(f"law '{self.law.name}': the temperature '{name}' has no value; give {name}=... [K]")
-            try:
-                temperature = np.broadcast_to(np.asarray(given.pop(name), dtype=float), (count,)).copy()
-            except (TypeError, ValueError):
-                raise InputError(
-                    f"law '{self.law.name}': the temperature '{name}' must be a number or one per point, {count}"
-                ) from None
-            if not (np.isfinite(temperature).all() and (temperature > 0.0).all()):
-                raise InputError(f"law '{self.law.name}': the temperature '{name}' must be positive and finite [K]")
+        heat, given = thermal_input(self.law, values, count)
+        temperature = heat.temperature if self.law.temperature is not None else None
         return self.law.admissible_values(given), temperature
 
     def step(self, numbers: Mapping[str, float], dt: float) -> GeneralStep:

@@ -213,6 +213,8 @@ def _run_general(
     n = len(plan.base)
     given = None if initial_state is None else {k: np.asarray(v, dtype=float) for k, v in initial_state.items()}
     packed = update.packing.pack(given, 1)
+    if temperatures is not None:
+        temperatures = np.broadcast_to(np.asarray(temperatures, dtype=float), (n,))
     failed, residual, scale, found = follow(
         update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, _time_steps(times, n), temperatures
     )
