@@ -22,7 +22,8 @@ class Assembly:
 
     In two dimensions (d = 2) bodies are disks and nothing has a third component; `spin` then has one column. Where no body turns it has
     none. Box: |x_a| ≤ half_a with one degree of freedom per axis, the half length; both walls of a pair move symmetrically; half
-    lengths inf: no box. A body of infinite mass is fixed.
+    lengths inf: no box. A body of infinite mass is fixed, or goes on with the velocity it has (the work that takes is in no term of the
+    energy).
     """
 
     x: Array  # (n, d) centres [m]

@@ -76,7 +76,7 @@ class Simulation:
         self.material = material
         self.solver = solver
         self.theta = theta
-        self.planes = tuple(planes)
+        self._planes = tuple(planes)
         self.skin = 0.15 * a.grain_radius if skin is None else skin
         self._reach = 0.04 * assembly.grain_radius if reach is None else reach
         self._reach_grows = reach is None
@@ -102,6 +102,23 @@ class Simulation:
         if threads > 1:
             _start_threads(threads)
         self._prepare()
+
+    @property
+    def planes(self) -> tuple[Plane, ...]:
+        """The planes; between steps they may be exchanged for as many with the same normals and frictions, that is for other drives."""
+        return self._planes
+
+    @planes.setter
+    def planes(self, planes: Sequence[Plane]) -> None:
+        same = len(planes) == len(self._planes) and all(
+            np.array_equal(new.direction, old.direction) and new.friction == old.friction
+            for new, old in zip(planes, self._planes, strict=True)
+        )
+        if not same:
+            raise InputError(
+                "planes: normals and frictions stay for the life of a simulation; make a new one for other planes"
+            )
+        self._planes = tuple(planes)
 
     def _prepare(self) -> None:
         """Everything that stays the same during the life of the simulation."""

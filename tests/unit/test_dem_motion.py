@@ -7,9 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 from typer.testing import CliRunner
 
 from fenchel.cli import app
+from fenchel.dem import chain, hexagonal_floor, lattice
 from fenchel.dem.motion import MotionStage, run_motion
 from fenchel.dem.motion_scene import bodies_of, read_motion_scene
 from fenchel.errors import InputError
@@ -182,3 +184,28 @@ def test_a_bad_scene_is_one_line_with_the_path_of_the_key(name: str, tmp_path: P
     assert "\n" not in said
     for word in words:
         assert word in said, said
+
+
+def test_floors_chains_and_lattices() -> None:
+    floor = hexagonal_floor(0.01, (0.0, -0.05), (0.1, 0.05), top=0.02)
+    tree = cKDTree(floor)
+    near = tree.query(floor, k=7)[0][:, 1:]
+    inside = np.all((floor[:, :2] > [0.02, -0.03]) & (floor[:, :2] < [0.08, 0.03]), axis=1)
+    # six touching neighbours inside, every point of the rectangle within 2r/sqrt(3) of a bead, all tops at one height
+    np.testing.assert_allclose(near[inside], 0.02, rtol=1e-12)
+    assert inside.sum() > 5 and np.all(floor[:, 2] + 0.01 == pytest.approx(0.02))
+    points = np.random.default_rng(0).uniform([0.0, -0.05], [0.1, 0.05], (500, 2))
+    reach = cKDTree(floor[:, :2]).query(points)[0]
+    assert reach.max() <= 0.02 / np.sqrt(3.0) + 1e-12
+    x, wire, rank = chain(np.array([1.0, 2.0]), np.array([0.0, 3.0]), 4, 0.5, wire=2)
+    np.testing.assert_allclose(x, [[1.0, 2.0], [1.0, 2.5], [1.0, 3.0], [1.0, 3.5]])
+    assert list(wire) == [2] * 4 and list(rank) == [0, 1, 2, 3]
+    places = lattice(7, np.zeros(3), np.array([0.02, 0.02, 0.05]), 0.01)
+    assert len(np.unique(places, axis=0)) == 7 and places[:4, 2].max() == pytest.approx(0.005)
+    for call in (
+        lambda: hexagonal_floor(0.0, (0, 0), (1, 1)),
+        lambda: chain(np.zeros(3), np.zeros(3), 3, 1.0),
+        lambda: lattice(9, np.zeros(2), np.ones(2), 0.4),
+    ):
+        with pytest.raises(InputError):
+            call()

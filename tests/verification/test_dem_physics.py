@@ -388,6 +388,15 @@ def test_bad_planes_are_one_line() -> None:
         with pytest.raises(InputError, match=rule) as info:
             Plane(**({"normal": (0, 0, 1), "point": (0, 0, 0)} | words))
         assert "\n" not in str(info.value)
+    simulation = Simulation(ball(1.0), Laws(), Solver(), planes=[FLOOR])
+    simulation.planes = (Plane(normal=(0, 0, 2), point=(0, 0, 0), velocity=(0, 0, 1)),)
+    for other in (
+        (),
+        (Plane(normal=(0, 0, 1), point=(0, 0, 0), friction=0.1),),
+        (Plane(normal=(0, 1, 1), point=(0, 0, 0)),),
+    ):
+        with pytest.raises(InputError, match="for the life"):
+            simulation.planes = other
     with pytest.raises(InputError, match="components"):
         Simulation(ball(1.0), Laws(), Solver(), planes=[Plane(normal=(0, 1), point=(0, 0))])
     with pytest.raises(InputError, match="theta"):
