@@ -222,17 +222,10 @@ def test_an_asymmetric_operator_is_solved_as_given() -> None:
 @pytest.mark.parametrize("solver", SOLVERS)
 def test_no_solver_claims_what_it_did_not_reach(solver: str) -> None:
     claims = 0
-    for family in (
-        boxes(3),
-        spheres(5, 2, mu=0.4),
-        wedge(0.5),
-        boxes(2, mu=0.0),
-        wedge(0.3, squeeze=0.1),
-        spheres(5, 3, mu=3.0),
-    ):
+    for family in (boxes(2), wedge(0.5), boxes(1, mu=0.0), wedge(0.3, squeeze=0.1), spheres(5, 2, mu=3.0)):
         problem = of(family)
-        for tolerance in (1e-3, 1e-8, 1e-15):
-            solution = solve(problem, solver=solver, tolerance=tolerance, time_limit=0.3, keep_unconverged=True)
+        for tolerance in (1e-3, 1e-8, 1e-13):
+            solution = solve(problem, solver=solver, tolerance=tolerance, time_limit=0.05, keep_unconverged=True)
             assert np.all(np.isfinite(solution.r))
             assert solution.errors.reaction_violation < 1e-12
             if solution.converged:
@@ -241,7 +234,7 @@ def test_no_solver_claims_what_it_did_not_reach(solver: str) -> None:
             else:
                 assert solution.status in (Status.ITERATION_LIMIT, Status.INFEASIBLE)
                 assert solution.errors.worst > tolerance
-    assert claims >= 5
+    assert claims >= 3
 
 
 def test_the_solvers_agree_on_velocities() -> None:
