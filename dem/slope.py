@@ -141,6 +141,9 @@ class SlopeDeposit:
         self.step_limit = step_limit
         self.steps = 0
         self.calm = 0
+        self.ratio = 1.0  # kinetic energy over the energy set free
+        self.worst = 0.0  # natural map
+        self.overlap = 0.0  # [m], of the last step
         self.settled = 0.0  # largest share of the way to rest so far, on a logarithmic scale
         self.start = self._energy().potential
 
@@ -188,7 +191,8 @@ class SlopeDeposit:
         self.steps += 1
         level = self._energy()
         free = max(self.start - level.potential, 1e-12 * abs(self.start))
-        ratio = level.kinetic / free
+        self.ratio = ratio = level.kinetic / free
+        self.worst, self.overlap = max(self.worst, measures["natural_map"]), measures["overlap_max"]
         self.calm = self.calm + 1 if ratio < self.rest else 0
         if self.steps > 80 and self.tightened < len(_TIGHTEN) and ratio < _TIGHTEN[self.tightened]:
             self.tightened += 1
@@ -217,6 +221,11 @@ class SlopeDeposit:
             "steps": self.steps,
             "calm": self.calm,
             "settled": self.settled,
+            "ratio": self.ratio,
+            "worst": self.worst,
+            "overlap": self.overlap,
+            "sweeps": self.simulation.total_sweeps,
+            "rows": self.simulation.total_rows,
             "start": self.start,
             "tightened": self.tightened,
             "next_step": self.pace.step,
@@ -227,6 +236,8 @@ class SlopeDeposit:
         """Inverse of `state`."""
         self.steps, self.calm = int(state["steps"]), int(state["calm"])
         self.settled, self.start = float(state["settled"]), float(state["start"])
+        self.ratio, self.worst, self.overlap = (float(state[name]) for name in ("ratio", "worst", "overlap"))
+        self.simulation.total_sweeps, self.simulation.total_rows = int(state["sweeps"]), int(state["rows"])
         self.tightened, self.pace.cuts = int(state["tightened"]), int(state["cuts"])
         self.pace.step = float(state["next_step"])
         self.simulation.solver = self._solvers[self.tightened]

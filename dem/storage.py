@@ -34,7 +34,7 @@ UNITS = {
     "strain_sand": "1", "strain_wire": "1", "stress_grains": "Pa", "stress_beads": "Pa", "stress_links": "Pa", "force_mean": "N",
     "overlap_mean": "m", "overlap_max": "m", "violation_max": "m", "natural_map": "1", "natural_map_max": "1", "unbalanced": "1",
     "sliding": "1", "closed": "1", "sweeps": "1", "change": "1", "inertial_number": "1", "speed": "1", "sphere": "m",
-    "start_half": "m", "start_x": "m", "wire_density": "m-2",
+    "start_half": "m", "start_x": "m", "distance": "m", "height": "m", "angles": "deg", "start": "J", "wire_density": "m-2",
     # count, Σx, Σu, Σx⊗x, Σu⊗x one after the other
     "grain_fit": "1, m, m2", "bead_fit": "1, m, m2",
 }  # fmt: skip

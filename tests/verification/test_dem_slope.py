@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import pickle
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from fenchel.dem import Assembly, Material
+from fenchel.cli import main
+from fenchel.dem import Assembly, Material, Progress
 from fenchel.dem.measures import coordination
 from fenchel.dem.samples import UniformByNumber, random_sample
 from fenchel.dem.slope import SlopeDeposit, slope_start
+from fenchel.dem.slope_scene import QUALITY, read_slope_scene, run_slope
 from fenchel.errors import ConvergenceError, InputError
 
 RADIUS = 0.4e-3
@@ -117,3 +121,68 @@ def test_what_is_no_deposit(start: Assembly) -> None:
         SlopeDeposit(start.copy(), LAW, density=DENSITY, rest=0.0)
     with pytest.raises(InputError, match="spheres in space"):
         slope_start(Assembly.of_spheres(np.zeros((1, 2)), np.ones(1), np.ones(1), np.ones(2)), density=DENSITY)
+
+
+SCENE = """
+seed = 3
+[slope]
+reach = 1.2
+solid_fraction = 0.5
+azimuths = 2
+rest = 1e-3
+[grains]
+count = 40
+sizes = "sieve"
+opening = [0.56e-3, 0.8e-3, 1.0e-3]
+passing = [0.0, 0.5, 1.0]
+[wires]
+density = 4e5
+beads = 8
+"""
+
+
+def test_a_scene_of_a_deposit(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    scene, run = tmp_path / "slope.toml", tmp_path / "slope.h5"
+    scene.write_text(SCENE)
+    assert main(["dem", str(scene), "-o", str(run), "--quiet", "--json", "--export", "xyz"]) == 0
+    told = json.loads(capsys.readouterr().out)
+    assert set(told["quality"]) == set(QUALITY) and told["quality"]["kinetic"] < 1e-3
+    assert told["quality"]["angle_low"] < told["quality"]["angle"] < told["quality"]["angle_high"]
+    assert len(told["profile"]["angles"]) == 2 and told["measures"]["link_taut"] > 0
+    assert told["quality"]["natural_map_max"] < 0.1
+    # stopped at any step and gone on with: the same bytes
+    whole = run.read_bytes()
+    run.unlink()
+
+    class Stop(Exception):
+        pass
+
+    def watch(progress: Progress) -> None:
+        if progress.step > 100:
+            raise Stop
+
+    with pytest.raises(Stop):
+        run_slope(scene, run, progress=watch, every=0.0)
+    assert run.read_bytes() != whole
+    run_slope(scene, run, resume=True)
+    assert run.read_bytes() == whole
+
+
+def test_a_bad_scene_of_a_deposit_is_one_line(tmp_path: Path) -> None:
+    scene = tmp_path / "bad.toml"
+    for text, words in {
+        '[slope]\n[grains]\nsizes = "lognormal"\n': ("grains.median", "lognormal"),
+        '[slope]\n[grains]\nsizes = "sieve"\nopening = [1e-3, 2e-3]\npassing = [0.0, 90.0]\n': (
+            "grains.opening",
+            "no per cent",
+        ),
+        "[slope]\n[grains]\nradius = [2e-3, 1e-3]\n": ("grains.radius", "smallest"),
+        "[slope]\ngravity = -1.0\n": ("slope.gravity", "> 0"),
+        "[slope]\nangle = 3\n": ("slope", "angle", "reach"),
+        "[slope]\n[wires]\ndensity = 1e5\nspacing = -1.0\n": ("wires.spacing", "positive"),
+        "[slope]\n[wires]\n": ("wires", "density"),
+    }.items():
+        scene.write_text(text)
+        with pytest.raises(InputError) as refused:
+            read_slope_scene(scene)
+        assert "\n" not in str(refused.value) and all(word in str(refused.value) for word in words), refused.value

@@ -36,7 +36,8 @@ def _dem(
 ) -> None:
     """Make a sample of grains and wires, test it, and write its run file; the last tables say how well it was solved, and by which code.
 
-    A scene with a table [motion] instead of [triaxial] lets bodies move freely: grains, planes, floors, chains.
+    A scene with a table [motion] instead of [triaxial] lets bodies move freely: grains, planes, floors, chains. One with a table [slope]
+    releases a block of grains and wires on a rough floor and measures its slope.
 
     With --resume a finished run is read again and not run again: a way to export it later.
 
@@ -46,6 +47,7 @@ def _dem(
     from fenchel.dem.export import export_run, network_of_run
     from fenchel.dem.measures import summary
     from fenchel.dem.motion_scene import is_motion
+    from fenchel.dem.slope_scene import is_slope
     from fenchel.dem.storage import load_run
     from fenchel.dem.triaxial import QUALITY
 
@@ -54,6 +56,9 @@ def _dem(
 
     if is_motion(scene):
         _motion(scene, output, resume, quiet, json_wanted, export)
+        return
+    if is_slope(scene):
+        _slope(scene, output, resume, quiet, json_wanted, export)
         return
     with progress_bar(not quiet) as progress:
         record = run_scene(scene, output, resume=resume, progress=progress)
@@ -108,6 +113,38 @@ def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: b
         return
     rows = [(name, value, *QUALITY[name]) for name, value in quality.items()]
     print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(frames['time'])} frames")
+    _print_kernels(content["kernels"])
+    _print_state(measures, exported)
+
+
+def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
+    """Run the scene of a deposit."""
+    from fenchel.dem.export import export_run, network_of_run
+    from fenchel.dem.measures import summary
+    from fenchel.dem.slope_scene import QUALITY, run_slope
+
+    from .progress import progress_bar
+    from .tables import print_json, print_table
+
+    with progress_bar(not quiet) as progress:
+        content = run_slope(scene, output, resume=resume, progress=progress)
+    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    measures = summary(network_of_run(output))
+    quality, profile = content["quality"], content["profile"]
+    if json_wanted:
+        print_json(
+            {
+                "run": output,
+                "quality": quality,
+                "profile": profile,
+                "measures": measures,
+                "exports": exported,
+                "kernels": content["kernels"],
+            }
+        )
+        return
+    rows = [(name, value, *QUALITY[name]) for name, value in quality.items()]
+    print_table(("deposit", "value", "unit", "meaning"), rows, title=f"{output}")
     _print_kernels(content["kernels"])
     _print_state(measures, exported)
 
