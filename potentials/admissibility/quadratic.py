@@ -16,8 +16,8 @@ from typing import Any
 
 from sympy import Add, Dummy, Expr, Integer, Mul, Poly, Pow, Rational, S, cancel, default_sort_key
 
-from ..atoms.inner import InnerLeaf
-from ..atoms.trace import TraceLeaf
+from ..atoms.inner import InnerLeaf, inner
+from ..atoms.trace import TraceLeaf, tr
 from ..scalars import ScalarVariable
 from ..tensor import Deviator, IdentityTensor
 
@@ -32,6 +32,8 @@ def degree_of(expression: Any, variables: frozenset[Any]) -> int | None:
     """Degree as a polynomial in traces, scalar products and scalars of the variables; None if it is none."""
     if not expression.has(*variables):
         return 0
+    if _hides(expression, variables):
+        return degree_of(_opened(expression, variables), variables)
     if isinstance(expression, (ScalarVariable, TraceLeaf)):
         return 1
     if isinstance(expression, InnerLeaf):
@@ -46,6 +48,36 @@ def degree_of(expression: Any, variables: frozenset[Any]) -> int | None:
         inside = degree_of(expression.base, variables)
         return None if inside is None else inside * int(expression.exp)
     return None
+
+
+def _hides(leaf: Any, variables: frozenset[Any]) -> bool:
+    """True if a coefficient inside the leaf depends on a variable (a thermal strain a (T − T₀) I)."""
+    return isinstance(leaf, (TraceLeaf, InnerLeaf)) and any(
+        c.has(*variables)
+        for a in leaf.args
+        for c in a.terms().values()  # type: ignore[attr-defined]
+    )
+
+
+def _opened(expression: Any, variables: frozenset[Any]) -> Any:
+    """The expression with such leaves multiplied out."""
+    found = {}
+    for leaf in expression.atoms(TraceLeaf, InnerLeaf):
+        if not _hides(leaf, variables):
+            continue
+        parts = [a.terms().items() for a in leaf.args]
+        if isinstance(leaf, TraceLeaf):
+            found[leaf] = sum((c * tr(x) for x, c in parts[0]), S.Zero)
+        else:
+            found[leaf] = sum((c * d * _product(x, y) for x, c in parts[0] for y, d in parts[1]), S.Zero)
+    return expression.xreplace(found) if found else expression
+
+
+def _product(x: Any, y: Any) -> Expr:
+    for one, two in ((x, y), (y, x)):
+        if isinstance(one, IdentityTensor):
+            return tr(two)
+    return inner(x, y)
 
 
 @dataclass
@@ -79,6 +111,7 @@ class Form:
 
 def quadratic_form(expression: Expr, variables: frozenset[Any]) -> Form:
     """Coefficients of a polynomial of degree at most two."""
+    expression = _opened(expression, variables)
     leaves = sorted(
         {n for n in expression.atoms(TraceLeaf, InnerLeaf, ScalarVariable) if n.has(*variables)}, key=default_sort_key
     )

@@ -158,3 +158,12 @@ def test_the_table_of_atoms_refuses_a_second_record_and_names_strangers():
     with pytest.raises(DeclarationError, match="sin"):
         Law("odd", psi=sin(p) + isotropic(E, nu).energy(eps), observable=eps, internal=(p,))
     assert all(atom.word and atom.smoothness in ("smooth", "C1", "continuous") for atom in ATOMS.values())
+
+
+def test_a_thermal_strain_inside_a_square_counts_for_concavity_in_temperature():
+    """½ (ε − aΔT I):K(ε − aΔT I) holds + 9K a² ΔT²/2, convex in T: no sign of ν makes that vanish."""
+    psi = isotropic(E, nu).energy(eps - a * (T - T0) * identity) - c * (T * log(T / T0) - T)
+    law = Law("warm", psi=psi, observable=eps)
+    for poisson in (-0.2, 0.3):
+        assert law.check(E=1e9, nu=poisson, a=1e-5, c=2e6, T0=300.0).admissible is not True
+    assert law.check(E=1e9, nu=0.3, a=0.0, c=2e6, T0=300.0).admissible is True
