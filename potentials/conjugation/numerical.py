@@ -14,7 +14,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from sympy import Float
+
 from ...errors import ConvergenceError, DeclarationError, InputError
+from ..atoms import atom_of
+from ..atoms.atom import Invariant
 from ..atoms.norm import NormLeaf
 from ..derivative import partial
 from ..evaluate import evaluate
@@ -30,6 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["NumericalConjugate", "conjugate_arguments", "conjugate_values", "numerical_conjugate"]
 
 REACH = 10.0
+SOLVER = 1e-10
 AT_REST = 1e-2
 
 
@@ -183,35 +188,37 @@ class _Supremum:
 
         from ..conic_form import Frame, conic_expression
 
-        u = cvxpy.Variable(self.size)
-        z = length * u
+        z = cvxpy.Variable(self.size)
         frame = Frame(self.places, self.size, self.numbers, True)
         constraints: list[Any] = []
-        finite = conic_expression(frame.substituted(self.function.finite), frame, z, constraints)
+        finite = conic_expression(
+            self._in_units(frame, self.function.finite, length) / Float(unit), frame, z, constraints
+        )
         for e in self.equalities:
             if isinstance(e, NormLeaf):
                 matrix, shift = frame.ranked(e.args[0])  # type: ignore[arg-type]
-                constraints.append(matrix @ z + shift == 0.0)
+                constraints.append(matrix @ z + shift / length == 0.0)
             else:
-                constraints.append(conic_expression(frame.substituted(e), frame, z, constraints) == 0.0)
+                constraints.append(conic_expression(self._in_units(frame, e, length), frame, z, constraints) == 0.0)
         for f in self.inequalities:
-            surface = conic_expression(frame.substituted(f), frame, z, constraints)
+            surface = conic_expression(self._in_units(frame, f, length) / Float(length), frame, z, constraints)
             constraints.append(surface <= 0.0)
-        problem = cvxpy.Problem(cvxpy.Minimize((finite - self.dual @ z) / unit), constraints)
+        work = (length / unit) * self.dual
+        problem = cvxpy.Problem(cvxpy.Minimize(finite - work @ z), constraints)
         if not problem.is_dcp():
             raise DeclarationError(f"the convexity of {self.function} does not follow from the rules of its atoms")
         if not constraints and (isinstance(finite, float) or finite.is_affine()):
             # y·x less an affine function is bounded only where it is constant
             ends = [
-                finite if isinstance(finite, float) else self._at(finite, u, e)
+                finite if isinstance(finite, float) else self._at(finite, z, e)
                 for e in np.vstack([0 * self.dual, np.eye(self.size)])
             ]
-            slope = (np.array(ends[1:]) - ends[0]) / length - self.dual
-            if np.abs(slope).max() > 1e-12 * max(float(np.abs(self.dual).max()), 1e-300):
+            slope = np.array(ends[1:]) - ends[0] - work
+            if np.abs(slope).max() > 1e-12 * max(float(np.abs(work).max()), 1e-300):
                 return NumericalConjugate(np.inf, {}, 0.0)
-            return NumericalConjugate(-float(ends[0]), self._unpacked(np.zeros(self.size)), 0.0)
+            return NumericalConjugate(-unit * float(ends[0]), self._unpacked(np.zeros(self.size)), 0.0)
         data, chain, _ = problem.get_problem_data(cvxpy.CLARABEL)
-        options = {"tol_gap_abs": 1e-10, "tol_gap_rel": 1e-10, "tol_feas": 1e-10, "max_iter": 200}
+        options = {"tol_gap_abs": SOLVER, "tol_gap_rel": SOLVER, "tol_feas": SOLVER, "max_iter": 200}
         assert chain is not None
         raw = chain.solve_via_data(problem, data, solver_opts=options)
         status = str(raw.status)
@@ -220,7 +227,7 @@ class _Supremum:
         if "PrimalInfeasible" in status:
             raise InputError(f"{self.function} is nowhere finite at these values")
         v, dual = np.asarray(raw.x), np.asarray(raw.z)
-        column = data["param_prob"].var_id_to_col[u.id]
+        column = data["param_prob"].var_id_to_col[z.id]
         x = self._feasible(length * v[column : column + self.size])
         lower = self._objective(x)
         A, b, q = data["A"], np.asarray(data["b"]), np.asarray(data["c"])
@@ -238,6 +245,24 @@ class _Supremum:
         return NumericalConjugate(
             lower, self._unpacked(x), max(-unit * bound - lower, 0.0) if np.isfinite(lower) else np.inf
         )
+
+    def _in_units(self, frame: Any, expression: Any, length: float) -> Any:
+        """The expression in u = x/length; a homogeneous invariant gives out its power of the length: every unknown is of order one."""
+        unit = Float(length, 17)
+        table: dict[Any, Any] = {s: unit * s for s in self.places if not isinstance(s, Ranked)}
+        for leaf in expression.atoms(Invariant):
+            if not frame.moves(leaf):
+                continue
+            degree = atom_of(leaf).degree(leaf)
+            if degree is None:
+                table[leaf] = leaf.xreplace({s: s * unit for s in self.places if isinstance(s, Ranked)})
+                continue
+            arguments = []
+            for quantity in leaf.args:
+                kept = [(a, c if frame.moves(a) else c / unit) for a, c in quantity.terms().items()]  # type: ignore[attr-defined]
+                arguments.append(quantity.linear(kept))  # type: ignore[attr-defined]
+            table[leaf] = unit**degree * leaf.func(*arguments)
+        return frame.substituted(expression.xreplace(table))
 
     @staticmethod
     def _at(expression: Any, variable: Any, point: Any) -> float:

@@ -32,6 +32,7 @@ from fenchel.potentials import (
     unilateral_energy,
     vector,
 )
+from fenchel.potentials.conjugation import numerical
 from fenchel.potentials.derivative import partial
 from fenchel.potentials.evaluate import evaluate
 from fenchel.potentials.library import ENTRIES, LAWS
@@ -356,6 +357,20 @@ def test_certified_numbers_enclose_the_supremum():
         e = found.argument[eps]
         inside = function.finite if hasattr(function, "finite") else function
         assert found.value == pytest.approx(float(root @ e - evaluate(inside, {**values, eps: e})), abs=1e-12)
+
+
+def test_the_gap_is_honest_when_the_solver_stops_early(monkeypatch):
+    monkeypatch.setattr(numerical, "SOLVER", 3e-2)
+    rng, values = np.random.default_rng(8), {K: 1.4, G: 0.6}
+    function = K / 2 * pos(tr(eps)) ** 2 + G * inner(pos(eps), pos(eps)) + norm(eps) + K * inner(eps, eps)
+    for _ in range(20):
+        dual = {eps: 5 * rng.normal(size=6)}
+        rough = numerical_conjugate(function, eps, dual, values, tolerance=np.inf)
+        monkeypatch.setattr(numerical, "SOLVER", 1e-10)
+        fine = numerical_conjugate(function, eps, dual, values)
+        monkeypatch.setattr(numerical, "SOLVER", 3e-2)
+        assert fine.gap < 1e-6 * (1 + abs(fine.value))
+        assert rough.value <= fine.value + fine.gap and fine.value <= rough.value + rough.gap
 
 
 def test_an_infinite_supremum_and_bad_requests():
