@@ -208,9 +208,9 @@ def run_slope(
 ) -> dict[str, Any]:
     """Let the block come to rest and leave everything in `run_file`; returns the content of the file.
 
-    `quality` holds what `QUALITY` names, `profile` the mean free surface (distance and height [m]) and the angles of the azimuths [°].
-    Raises `InputError` for a bad scene or run file, `ConvergenceError` for a heap that does not come to rest, `StorageError` when the file
-    cannot be written.
+    `quality` holds what `QUALITY` names (nan for the slope of a heap with too few bodies on its surface), `profile` the mean free surface
+    (distance and height [m]) and the angles of the azimuths [°]. Raises `InputError` for a bad scene or run file, `ConvergenceError` for a
+    heap that does not come to rest, `StorageError` when the file cannot be written.
     """
     scene = check_slope_scene(scene_file) if isinstance(scene_file, SlopeScene) else read_slope_scene(scene_file)
     settings = {"scene": msgspec.to_builtins(scene)}
@@ -219,7 +219,21 @@ def run_slope(
 
     def finish(assembly: Assembly, stage: Stage) -> dict[str, Any]:
         assert isinstance(stage, SlopeDeposit)
-        found = stage.repose(azimuths=scene.slope.azimuths)
+        try:
+            found = stage.repose(azimuths=scene.slope.azimuths)
+        except InputError:
+            # too few bodies on the surface: the deposit is there all the same, only its angle is not
+            none = np.zeros(0)
+            found = Repose(
+                angle=np.nan,
+                low=np.nan,
+                high=np.nan,
+                angles=none,
+                height=np.nan,
+                reach=np.nan,
+                distance=none,
+                profile=none,
+            )
         return {
             "quality": _quality(stage, found),
             "profile": {"distance": found.distance, "height": found.profile, "angles": found.angles},

@@ -131,7 +131,7 @@ solid_fraction = 0.5
 azimuths = 2
 rest = 1e-3
 [grains]
-count = 40
+count = 60
 sizes = "sieve"
 opening = [0.56e-3, 0.8e-3, 1.0e-3]
 passing = [0.0, 0.5, 1.0]
@@ -166,6 +166,14 @@ def test_a_scene_of_a_deposit(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert run.read_bytes() != whole
     run_slope(scene, run, resume=True)
     assert run.read_bytes() == whole
+
+
+def test_a_heap_too_small_for_an_angle_is_a_result_without_one(tmp_path: Path) -> None:
+    scene = tmp_path / "few.toml"
+    scene.write_text("[slope]\nreach = 1.0\nsolid_fraction = 0.4\nrest = 1e-2\n[grains]\ncount = 10\n")
+    content = run_slope(scene, tmp_path / "few.h5")
+    assert np.isnan(content["quality"]["angle"]) and content["quality"]["kinetic"] < 1e-2
+    assert len(content["profile"]["angles"]) == 0 and (tmp_path / "few.h5").exists()
 
 
 def test_a_bad_scene_of_a_deposit_is_one_line(tmp_path: Path) -> None:
