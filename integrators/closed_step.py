@@ -35,27 +35,21 @@ def closed_step() -> Any:
 def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, status, coefficients, plan):
     tensors, scalars = plan[0], plan[1]
     terms = plan[2]
-    varying = coefficients.shape[0] > 1
+    step = 1 if coefficients.shape[0] > 1 else 0
     last = tangent.shape[0] - 1
     work = np.zeros(WORK)
     third = 1.0 / 3.0
-    c = coefficients[0]
     first = 10 + 6 * tensors
     strain = first + 2 * scalars
-    a, w_q, w_m, g_q, g_t, f_0, limit, s_0, s_1, sphere_0 = c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9]
-    h = a * a * w_q + w_m
     for m in range(eps.shape[0]):
-        if varying:
-            c = coefficients[m]
-            a, w_q, w_m, g_q, g_t, f_0, limit, s_0, s_1, sphere_0 = (
-                c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7], c[8], c[9],
-            )  # fmt: skip
-            h = a * a * w_q + w_m
+        c = coefficients[step * m]
+        a, w_q, w_m, g_q, g_t, s_0, s_1 = c[0], c[1], c[2], c[3], c[4], c[7], c[8]
+        h = a * a * w_q + w_m
         e, x, y, t = eps[m], old[m], new[m], tangent[min(m, last)]
         e0, e1, e2, e3, e4, e5 = e[0], e[1], e[2], e[3], e[4], e[5]
         trace = e0 + e1 + e2
-        f = f_0 + g_t * trace
-        sphere = sphere_0 + s_1 * trace
+        f = c[5] + g_t * trace
+        sphere = c[9] + s_1 * trace
         b0, b1, b2, b3, b4, b5 = g_q * e0, g_q * e1, g_q * e2, g_q * e3, g_q * e4, g_q * e5
         s0, s1, s2, s3, s4, s5 = s_0 * e0, s_0 * e1, s_0 * e2, s_0 * e3, s_0 * e4, s_0 * e5
         for k in range(tensors):
@@ -86,17 +80,17 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
         inverse = 1.0 / q if q > 0.0 else 0.0
         flag = 0
         if not f <= 0.0:
-            gamma = f / h
+            p_tt = 1.0 / h
+            gamma = f * p_tt
+            if not h > 0.0:
+                flag = 3
             if q >= gamma * a * w_q:
                 slip = gamma * a * inverse
-                p_tt = 1.0 / h
                 p_qt = a * p_tt
                 p_qq = a * p_qt
-                if not h > 0.0:
-                    flag = 3
             else:
                 slip = 1.0 / w_q
-                p_qq = slip
+                p_qq, p_tt = slip, 0.0
                 if w_m > 0.0:
                     p_tt = 1.0 / w_m
                     gamma = (f - a * q) / w_m
@@ -118,7 +112,7 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
         s3, s4, s5 = s3 - w * b3, s4 - w * b4, s5 - w * b5
         s = stress[m]
         s[0], s[1], s[2], s[3], s[4], s[5] = s0, s1, s2, s3, s4, s5
-        dissipation[m] = gamma * limit
+        dissipation[m] = gamma * c[6]
         if want:
             drop = g_q * w
             c0 = s_0 - drop

@@ -103,7 +103,7 @@ def eigen(t, out):
     out[9], out[10], out[11] = u2, v2, w2
 
 
-@njit(folder=_FOLDER)
+@njit(folder=_FOLDER, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def positive_part(t, eigen_, out):
     """Spectral positive part of `t` into `out`; the decomposition is left in `eigen_`. Returns Σ ⟨t_i⟩²."""
     root = 1.4142135623730951
@@ -130,7 +130,7 @@ def positive_part(t, eigen_, out):
     return total
 
 
-@njit(folder=_FOLDER)
+@njit(folder=_FOLDER, no_cpython_wrapper=True, no_cfunc_wrapper=True)
 def add_positive_derivative(weight, eigen_, tangent):
     """Add weight · D[·]^≥ to `tangent`, a row of 36: Θ_ij = (⟨e_i⟩−⟨e_j⟩)/(e_i−e_j), and H(e_i) for equal values.
 

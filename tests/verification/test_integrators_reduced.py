@@ -140,7 +140,7 @@ def dual_program(surfaces):
     return solve
 
 
-def check_program(law, values, solve, unit, count=100, seed=0, dt=1.0, tolerance=2e-5):
+def check_program(law, values, solve, unit, count=100, seed=0, dt=1.0, tolerance=5e-5):
     """Stresses against the program; clarabel is right to the root of its gap, hence the tolerance (of the yield stress)."""
     rng = np.random.default_rng(seed)
     eps = random_strains(rng, count, unit / E_0, low=-1.0, high=1.0)
@@ -151,7 +151,7 @@ def check_program(law, values, solve, unit, count=100, seed=0, dt=1.0, tolerance
         if found is not None:  # clarabel itself says where it stopped short
             errors.append(np.abs(found - stress).max() / (unit + E_0 * np.abs(strain).max()))
     assert len(errors) >= 0.6 * count
-    assert np.max(errors) <= tolerance and np.median(errors) <= 1e-7
+    assert np.max(errors) <= tolerance and np.median(errors) <= 2e-6
     assert (out.dissipation > 0).mean() >= 0.3
 
 

@@ -23,6 +23,9 @@ class Solver(StrEnum):
 
     auto = "auto"
     closed = "closed"
+    reduced = "reduced"
+    principal = "principal"
+    general = "general"
     conic = "conic"
 
 
