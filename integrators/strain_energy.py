@@ -31,12 +31,25 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 
 
 def without_strain_terms(energy: Expr, strain: TensorSymbol) -> tuple[Expr, Expr]:
-    """(terms with other variables, terms of the strain alone); the temperature is data."""
+    """(terms with other variables, terms of the strain alone); the temperature is data.
+
+    A quadratic form of the strain stays with the rest: written out term by term, a square of ε − ε^p is convex with it only.
+    """
     rest, alone = [], []
     for term in Add.make_args(energy):
-        found = {v for v in variables_of(term) if not isinstance(v, Temperature)}
-        (alone if found == {strain} else rest).append(term)
+        aside = _variables(term) == {strain} and not _is_quadratic(term, strain)
+        (alone if aside else rest).append(term)
     return Add(*rest), Add(*alone)
+
+
+def _variables(thing: Any) -> set[Any]:
+    return {v for v in variables_of(thing) if not isinstance(v, Temperature)}
+
+
+def _is_quadratic(term: Expr, strain: TensorSymbol) -> bool:
+    operator = second_derivative(term, strain, strain)
+    parts = [operator.c0, operator.c1, *(part for dyad in operator.dyads for part in dyad)]
+    return not operator.spectral and not operator.functions and not any(_variables(part) for part in parts)
 
 
 @dataclass(frozen=True)

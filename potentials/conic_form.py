@@ -15,7 +15,24 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Dummy, Expr, Float, Integer, Lambda, Mul, Poly, PolynomialError, Pow, S, Symbol, exp, expand, log
+from sympy import (
+    Add,
+    Dummy,
+    Expr,
+    Float,
+    Integer,
+    Lambda,
+    Mul,
+    Poly,
+    PolynomialError,
+    Pow,
+    S,
+    Symbol,
+    exp,
+    expand,
+    expand_mul,
+    log,
+)
 
 from ..errors import DeclarationError
 from .atoms import atom_of
@@ -202,6 +219,9 @@ def _terms(expression: Expr, frame: Frame) -> list[tuple[float, Expr]]:
             found.append((weight, S.One))
         elif len(moving) == 1 and isinstance(moving[0], Add):
             found += [(weight * w, t) for w, t in _terms(moving[0], frame)]
+        elif (opened := expand_mul(Mul(*moving))).is_Add:
+            # x (xⁿ + c) is a sum of powers of x
+            found += [(weight * w, t) for w, t in _terms(opened, frame)]
         else:
             found.append((weight, Mul(*moving)))
     return found

@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Add, Expr, Mul, Pow, S, default_sort_key, simplify, sqrt
+from sympy import Add, Expr, Mul, Pow, S, Tuple, default_sort_key, simplify, sqrt
 
 from ..atoms import atom_of
 from ..atoms.atom import Invariant
@@ -200,7 +200,7 @@ def _nonnegative(finite: Expr, variables: Sequence[Any], name: str, surfaces: Se
         return (curved + flat + zero).step(f"{name} is not negative: convex, and zero with a zero slope at zero")
 
     def refute(values: dict[Any, float], rng: Any, budget: Budget) -> CounterExample | None:
-        for data in _data(finite, variables, rng):
+        for data in _data(Tuple(finite, *surfaces), variables, rng):
             found = search_negative(
                 _space(variables, data, values, finite, *surfaces), finite, name, surfaces, rng, budget
             )
@@ -245,7 +245,7 @@ def _sublevel(surface: Expr, variables: Sequence[Any], name: str, which: str, su
         return prover.curved(expression, 1) or _quasi(prover, expression)
 
     def refute(values: dict[Any, float], rng: Any, budget: Budget) -> CounterExample | None:
-        for data in _data(Add(*surfaces), variables, rng):
+        for data in _data(Tuple(*surfaces), variables, rng):
             found = search_set(_space(variables, data, values, *surfaces), surfaces, name, rng, budget)
             if found is not None or budget.over:
                 return found
