@@ -455,3 +455,23 @@ def test_relaxation_finds_the_equilibrium_of_a_compliant_pile() -> None:
     np.testing.assert_allclose(gaps, -weight / k, rtol=1e-8)
     with pytest.raises(ConvergenceError, match="relaxation"):
         relax(Simulation(ball(1.0), Laws(contact=law), TIGHT, planes=[FLOOR]), down(), 1e-3, step_limit=5)
+
+
+@pytest.mark.parametrize("theta", [0.5, 0.8])
+def test_nothing_of_the_energy_is_left_over_where_directions_do_not_turn(theta: float) -> None:
+    """Two locked spheres dropped on a belt, compliant in both directions, bouncing and sliding: `balance` is round-off in every step."""
+    x = np.array([[0.0, 0.0, 0.0101], [0.0, 0.0, 0.0302]])
+    a = Assembly.of_spheres(x, np.full(2, 0.01), np.array([0.1, 0.05]), locked=np.full(2, True))
+    law = CompliantSignoriniCoulomb(friction=0.6, k_n=1e3, k_t=8e2)
+    belt = Plane(normal=(0, 0, 1), point=(0, 0, 0), friction=0.2, velocity=(0.05, 0, 0))
+    simulation = Simulation(a, Laws(contact=law), TIGHT, planes=[belt], theta=theta, reach=1e-2)
+    scale = 0.1 * G * 1e-2
+    worst, losses = 0.0, np.zeros(3)
+    for _ in range(300):
+        # only what happens along the axes of the first contact may move: the upper sphere stays above the lower one
+        a.x[1, 0], a.velocity[1, 0] = a.x[0, 0], a.velocity[0, 0]
+        measures = simulation.advance(5e-4, down())
+        worst = max(worst, abs(measures["balance"]))
+        losses += [measures["friction"], measures["algorithmic"], measures["shock"]]
+    assert worst < 1e-13 * scale
+    assert np.all(losses[:2] > 1e-3 * scale)
