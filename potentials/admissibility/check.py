@@ -78,8 +78,14 @@ class _Check:
             self.answers["psi" if question.potential.startswith("psi") else "phi"].append(answer)
         kind, notes = kind_of(law)
         answers = [a for found in self.answers.values() for a in found]
-        admissible = False if False in answers or outside else (None if None in answers else True)
-        self.reasons += [f"refused: {text}, the bounds that the law declares" for text in outside]
+        admissible = False if False in answers else (None if None in answers or outside else True)
+        opposed = next(
+            ((c, d) for c in self.conditions for d in self.conditions if c.expression == -d.expression), None
+        )
+        if admissible and opposed is not None:
+            admissible = None
+            self.reasons.append(f"undecided: {opposed[0]} and {opposed[1]} leave no room")
+        self.reasons += [f"outside the declaration: {text}" for text in outside]
         dissipative = None if None in self.answers["phi"] else False not in self.answers["phi"]
         self._closing(dissipative, notes)
         return AdmissibilityReport(

@@ -109,6 +109,8 @@ class Prover:
 
     def data_nonnegative(self, expression: Any, about: str = "weight", names: tuple[Any, ...] = ()) -> Proof | None:
         """Data that is not negative, or a condition that it be so; None if bounds contradict it, or if it depends on the state."""
+        if expression.is_number and not expression.is_real:
+            return None
         need = Need(expression, about, names)
         low, high = sharp_interval(expression, self._range)
         if low >= 0.0:

@@ -6,6 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 from sympy import Mul, Pow, S
 
+from ..ranked import Ranked
+from ..scalars import ScalarVariable
+
 if TYPE_CHECKING:
     from .convexity import Proof, Prover
 
@@ -42,11 +45,13 @@ def _large(prover: Prover, node: Any) -> Proof | None:
             return (inside + positive + order).step(
                 f"{node} is convex: a power of order at least one of a {word} function"
             )
-    if exponent.is_integer is not True and prover.affine(base):
-        # an exponent that need not be whole is a real power, which is not defined where the base is negative
+    if not exponent.is_number and isinstance(base, ScalarVariable) and base.role == "state":
+        # a parameter as exponent makes a real power of a state, as of an accumulated strain, which is defined on x >= 0; of a force
+        # or a trace, which take either sign, it has to be said by pos(...)
         from .convexity import Proof
 
-        return (order + Proof(domain=(base,))).step(f"{node} is convex where it is defined: a power of order at least one")
+        shown = f"{node} is convex on {base} >= 0, where a real power is defined: its order is at least one"
+        return (order + Proof(domain=(base,))).step(shown)
     return None
 
 
@@ -61,6 +66,8 @@ def _concave_power(prover: Prover, node: Any) -> Proof | None:
     positive = prover.nonnegative(base)
     proof = inside + low + high
     if positive is None:
+        if not exponent.is_number:
+            return None
         # the power is not defined where the base is negative; where it is not, the set is convex
         from .convexity import Proof
 
@@ -117,8 +124,6 @@ def _root(prover: Prover, term: Any, exponent: Any) -> Proof | None:
 def degree_of_homogeneity(prover: Prover, node: Any) -> Any:
     """Degree p ≥ 1 of homogeneity of a product of atoms in the variables, or None."""
     from ..atoms import ATOMS
-    from ..ranked import Ranked
-    from ..scalars import ScalarVariable
 
     if isinstance(node, ScalarVariable):
         return S.One

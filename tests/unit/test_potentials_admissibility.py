@@ -118,6 +118,8 @@ def test_convex_functions_are_proved(expression, variables):
         (Abs(P) - Abs(R), (P, R)),
         (pos(P) - pos(-P) ** 2, (P,)),
         (exp(-norm(A)), (A,)),
+        # convex up to 6: a program in floating point alone would let this pass
+        (P**4 + (6 + Rational(1, 10**7)) * P**2 * R**2 + R**4, (P, R)),
     ],
 )
 def test_functions_that_are_not_convex_are_not_proved(expression, variables):
@@ -167,6 +169,34 @@ def test_a_coupling_without_stiffness_must_vanish():
     assert free.check(E=1.0, nu=0.2, c=1e-3).admissible is False
 
 
+def test_a_decreasing_atom_turns_the_curvature_of_its_argument():
+    from sympy import Function
+
+    from fenchel.potentials.atoms import ATOMS, Atom, register
+
+    class Decay(Function):
+        """A stand-in for e^(-x)."""
+
+        is_real = True
+
+    class DecayAtom(Atom):
+        word = "decay"
+        node = Decay
+
+        def curvature(self, node, require):
+            return "convex"
+
+        def monotone(self, node, signs):
+            return (-1,)
+
+    register(DecayAtom())
+    try:
+        assert proved(Decay(-norm(A)), A) and proved(Decay(P), P) and proved(Decay(eig_min(A)), A)
+        assert not proved(Decay(norm(A)), A) and not proved(-Decay(P), P)
+    finally:
+        del ATOMS[Decay]
+
+
 def test_a_condition_that_fails_does_not_refute_where_another_rule_holds():
     sums = law(STIFF + H * Abs(p) + 2 * Abs(p) + H * p**2 + p**2, BALL, (p,))
     assert sums.check(E=1.0, nu=0.2, H=-0.5).admissible is True
@@ -187,6 +217,14 @@ def test_exponents_are_conditions():
     report = law(ELASTIC, a * norm(A) ** n, (eps_p,)).check()
     assert report.admissible is True and {"a >= 0", "n - 1 >= 0"} <= set(report.conditions)
     assert law(ELASTIC, norm(A) ** n, (eps_p,)).check(E=1, nu=0.2, n=0.5).admissible is False
+
+
+def test_a_real_power_of_a_state_is_convex_on_its_axis_and_of_a_force_is_not_known():
+    hardening = law(ELASTIC + H * p ** (n + 1) / (n + 1), indicator(norm(dev(A)) + P - C), (eps_p, p)).check()
+    assert hardening.admissible is True and "n >= 0" in hardening.conditions
+    assert any("p > 0" in x for x in hardening.reasons)
+    assert law(ELASTIC + p**2, a * P**n + MISES, (eps_p, p)).check().admissible is not True
+    assert not proved(tr(A) ** n, A)
 
 
 def test_cam_clay_with_the_consolidation_pressure_as_a_force():
@@ -300,7 +338,10 @@ def test_values():
         with pytest.raises(InputError, match=words):
             mises.check(**bad)
     bounded = law(STIFF + parameter("k", lower=0) * inner(eps, eps))
-    assert bounded.check(E=1.0, nu=0.2, k=-0.1).admissible is False
+    # convex all the same, but not what was declared: neither proved nor refuted
+    report = bounded.check(E=1.0, nu=0.2, k=-0.1)
+    assert report.admissible is None and any("outside the declaration: k = -0.1" in x for x in report.reasons)
+    assert bounded.check(E=1.0, nu=0.2, k=-1.0).admissible is False
 
 
 def test_the_report_as_text_and_as_json():
