@@ -22,6 +22,9 @@ class Partition:
 
     def sort(self, pairs: Ints, x: NDArray[np.float64]) -> Ints:
         """The pairs in the order of the parts, each part in the order given."""
+        if not len(pairs):
+            self.starts[:] = 0
+            return pairs
         axis = int(np.argmax(x.max(axis=0) - x.min(axis=0)))
         bounds = np.quantile(x[:, axis], np.arange(1, self.parts) / self.parts)
         part = np.searchsorted(bounds, x[:, axis])

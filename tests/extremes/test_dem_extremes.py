@@ -143,7 +143,7 @@ def large_on_small() -> None:
 def nobody() -> None:
     """No grain: a step is a step, nothing moves, nothing is divided by."""
     a = Assembly.of_spheres(np.zeros((0, 3)), np.zeros(0), np.zeros(0))
-    simulation = Simulation(a, Laws(contact=SignoriniCoulomb(friction=0.5)), TIGHT, planes=[FLOOR])
+    simulation = Simulation(a, Laws(contact=SignoriniCoulomb(friction=0.5)), TIGHT, planes=[FLOOR], threads=2)
     measures = simulation.advance(1e-3, DOWN)
     assert all(value == 0.0 for value in measures.values()) and a.time == 1e-3
 
