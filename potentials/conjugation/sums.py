@@ -12,8 +12,9 @@ from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
-from sympy import Expr, S
+from sympy import Add, Expr, S, Symbol
 
+from ..atoms.maximum import Maximum
 from ..atoms.positive_part import PositivePart
 from ..atoms.trace import tr
 from ..extended import Extended
@@ -24,6 +25,7 @@ from ..vector import VectorSymbol
 from .elimination import eliminated
 from .form import MinForm, Phase, is_zero
 from .groups import E, EigenGroup, GaugeGroup, QuadraticGroup, ScalarGroup, UnilateralGroup
+from .one_variable import conjugate_of_one_variable
 from .quadratic import Node, Quadratic, nodes_of, tidy_scalar
 from .slots import Multiplier, functional_of
 from .sorting import Sorter
@@ -62,6 +64,7 @@ class _Sum:
         self.groups: list[Any] = [*sorter.gauges, *sorter.scalars, *sorter.eigen]
         self.groups = self._unilateral(self.groups)
         self._merge_scalars()
+        self.groups = [part for g in self.groups for part in self._parted(g)]
 
     def conjugate(self) -> MinForm:
         self._tilt()
@@ -118,6 +121,18 @@ class _Sum:
                 self.quadratic = Quadratic(
                     self.slots, {k: v for k, v in self.quadratic.table.items() if k != (node, node)}
                 )
+
+    def _parted(self, group: Any) -> list[Any]:
+        """A function of one scalar without a closed conjugate as the functions it is the sum of, which share the dual."""
+        if not isinstance(group, ScalarGroup) or not group.function.is_Add:
+            return [group]
+        if conjugate_of_one_variable(group.function, E, Symbol("y", real=True)) is not None:
+            return [group]
+        terms = Add.make_args(group.function)
+        linear = Add(*(t for t in terms if t.diff(E, 2) == 0 and not t.has(PositivePart, Maximum)))
+        curved = [t for t in terms if t not in Add.make_args(linear)]
+        curved[0] = curved[0] + linear
+        return [ScalarGroup(self.slots, group.direction, t) for t in curved]
 
     # -- components ------------------------------------------------------------------------------------------------------------
 

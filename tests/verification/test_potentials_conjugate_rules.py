@@ -267,6 +267,11 @@ CASES = {
         (x,),
         lambda X: A * cp.exp(trace(X) / B) + C * sq(X),
     ),
+    "two functions of one scalar": (
+        a * exp(p) + b * pos(p) ** 2 - c * p,
+        (p,),
+        lambda s: A * cp.exp(s) + B * cp.square(cp.pos(s)) - C * s,
+    ),
     "extreme and all eigenvalues": (
         a * eig_max(x) + b * inner(pos(x), pos(x)) + inner(x, x),
         (x,),
@@ -278,7 +283,14 @@ CASES = {
         lambda X: held(cp.norm(DEV @ X) + trace(X) - A, largest(X) - B),
     ),
 }
-OPEN = {"extreme and all eigenvalues", "maximum", "parallel phases", "smooth sum of one scalar", "two cones"}
+OPEN = {
+    "two functions of one scalar",
+    "extreme and all eigenvalues",
+    "maximum",
+    "parallel phases",
+    "smooth sum of one scalar",
+    "two cones",
+}
 
 
 def supremum(by_hand, duals):
