@@ -190,7 +190,7 @@ def write_picture(network: Network, path: Path | str, *, view: str = "xz", thick
     if kind not in known:
         raise InputError(f"{path}: pictures are written as {', '.join(sorted(known))}; choose one of these endings")
     # without a date, so that equal states give equal files
-    extra = {"metadata": {"Date": None}} if kind == "svg" else {"dpi": 200} if kind == "png" else {}
+    extra: dict[str, Any] = {"metadata": {"Date": None}} if kind == "svg" else {"dpi": 200} if kind == "png" else {}
     figure.savefig(image, format=kind, **extra)
     replace_file(path, image.getvalue())
     return path

@@ -60,7 +60,7 @@ def anisotropy(tensor: Array) -> tuple[Array, Array]:
     """D = (d (d+2)/2) dev F of a fabric (d, d), and its eigenvalues in ascending order (d,)."""
     d = tensor.shape[0]
     deviator = 0.5 * d * (d + 2) * (tensor - np.trace(tensor) / d * np.eye(d))
-    return deviator, np.linalg.eigvalsh(deviator)
+    return deviator, np.asarray(np.linalg.eigvalsh(deviator), dtype=np.float64)
 
 
 def _wire_sums(network: Network) -> tuple[Array, Array]:
@@ -69,7 +69,7 @@ def _wire_sums(network: Network) -> tuple[Array, Array]:
     vector, length = network.link_vector, network.link_length
     sums = np.zeros((len(wires), network.dimension, network.dimension))
     np.add.at(sums, place, np.einsum("ki,kj->kij", vector, vector) / length[:, None, None])
-    return sums, np.bincount(place, weights=length, minlength=len(wires))
+    return sums, np.asarray(np.bincount(place, weights=length, minlength=len(wires)), dtype=np.float64)
 
 
 def wire_fabric_interval(

@@ -71,7 +71,7 @@ def angle_of_repose(
         profile[s] = np.bincount(place, weights=height, minlength=rings) / np.maximum(total, 1)
     mean = profile.mean(axis=0)
     height = float(mean.max())
-    middle = (np.arange(rings) + 0.5) * cell
+    middle = np.asarray((np.arange(rings) + 0.5) * cell, dtype=np.float64)
     near, far = (_crossing(middle, mean, share * height) for share in (between[1], between[0]))
     angles = np.empty(azimuths)
     for s, (where, tops, _) in enumerate(points):
