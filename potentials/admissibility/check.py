@@ -172,10 +172,11 @@ class _Check:
         found: list[CounterExample | None] = []
         wishes = [wish for q in self.questions for wish in q.wishes()]
         draws = parameter_draws(self.law, self.values, wishes, rng)
+        free = {p.name for p in self.law.parameters if p not in self.values}
         for draw in draws:
             found.append(question.refute(draw, rng, Budget(self.seconds / len(draws))))
-            if found[-1] is None:
-                break
+            if found[-1] is None or not set(found[-1].parameters) & free:
+                break  # a counter-example without free parameters is one for all of them
         for condition in failed:
             value = condition.value(self.values)
             self.reasons.append(
@@ -184,7 +185,8 @@ class _Check:
         if None not in found:
             first = self.example is None
             self.example = self.example or found[0]
-            self.reasons.append(f"{head}: refuted" + (" by the counter-example" if first else f", {found[0]}"))
+            tried = f"; so it is for all {len(found)} sets of parameters tried" if len(found) > 1 else ""
+            self.reasons.append(f"{head}: refuted" + (" by the counter-example" if first else f", {found[0]}") + tried)
             self._name_softening(question)
             return False
         first = next((f for f in found if f is not None), None)

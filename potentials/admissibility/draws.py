@@ -17,19 +17,24 @@ TRIES = 60
 
 
 def parameter_draws(
-    law: Law, given: dict[Any, float], wishes: list[Expr], rng: Any, count: int = 5
+    law: Law, given: dict[Any, float], wishes: list[Expr], rng: Any, count: int = 5, wide: int = 7
 ) -> list[dict[Any, float]]:
-    """`count` sets of values, the `given` ones kept, that break as few of the `wishes` (≥ 0) as can be; one set if nothing is free.
+    """`count` plain sets of values and `wide` ones over four decades of either sign, the `given` ones kept, that break as few of the
+    `wishes` (≥ 0) as can be; one set if nothing is free.
 
     A search that finds a counter-example only at values that are wrong for another reason would say nothing about the law.
     """
     free = [p for p in law.parameters if p not in given]
     if not free:
         return [dict(given)]
-    found = [{**given, **{p: _plain(p) for p in free}}]
-    while len(found) < TRIES:
-        found.append({**given, **{p: _random(p, rng) for p in free}})
     wanted = as_conditions([Need(w) for w in dict.fromkeys(wishes)], "")
+    plain = [{**given, **{p: _plain(p) for p in free}}]
+    plain += [{**given, **{p: _random(p, rng) for p in free}} for _ in range(TRIES)]
+    far = [{**given, **{p: _far(p, rng) for p in free}} for _ in range(TRIES)]
+    return _best(plain, wanted, count) + _best(far, wanted, wide)
+
+
+def _best(found: list[dict[Any, float]], wanted: list[Any], count: int) -> list[dict[Any, float]]:
     broken = [sum(holds(c, draw) is False for c in wanted) for draw in found]
     order = sorted(range(len(found)), key=lambda k: (broken[k], k))
     return [found[k] for k in order[:count]]
@@ -60,3 +65,9 @@ def _random(p: Parameter, rng: Any) -> float:
         value = float(10.0 ** rng.normal(0.0, 0.5)) * (-1.0 if rng.random() < 0.17 else 1.0)
     short = float(f"{value:.2e}")
     return short if p.lower <= short <= p.upper else value
+
+
+def _far(p: Parameter, rng: Any) -> float:
+    value = float(10.0 ** rng.uniform(-2.0, 2.0)) * (-1.0 if rng.random() < 0.5 else 1.0)
+    short = float(f"{value:.2e}")
+    return short if p.lower <= short <= p.upper else _random(p, rng)

@@ -211,6 +211,10 @@ def test_a_condition_that_fails_does_not_refute_where_another_rule_holds():
     report = free.check(E=1.0, nu=0.2, H=1.0)
     assert report.admissible is True and any("sum of squares" in x for x in report.reasons)
     assert free.check(E=1.0, nu=0.2, H=-1.0).admissible is False
+    # admissible for -10 <= H <= -4 only: what plain values refute is not refuted for all
+    far = law(STIFF + p**4 + (H + 10) * p**2 * r**2 + r**4, indicator(Abs(P) + Abs(R) - 1), (p, r))
+    assert far.check().admissible is not False
+    assert far.check(E=1.0, nu=0.2, H=-5.0).admissible is True
 
 
 def test_exponents_are_conditions():
