@@ -27,6 +27,7 @@ from .key import kernels_hash
 from .plan import (
     FROZEN,
     KIND,
+    METRIC,
     MOVING,
     NORM,
     PLACES,
@@ -210,12 +211,12 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
     flow, dyads, work = np.zeros(6), np.zeros((4, 6)), np.zeros(WORK)
     head = n - plan[MOVING]
     for start in range(0, eps.shape[0], BLOCK):
-        size = min(BLOCK, eps.shape[0] - start)
-        for i in range(size):
+        block = min(BLOCK, eps.shape[0] - start)
+        for i in range(block):
             m = start + i
             _trial(eps[m], old[m], coefficients[step * m], plan, b[i], axes[i], trial[i])
-        method(law, trial, coefficients, step * start, plan, found, status[start : start + size], size)
-        for i in range(size):
+        method(law, trial, coefficients, step * start, plan, found, status[start : start + block], block)
+        for i in range(block):
             m = start + i
             c, e, f = coefficients[step * m], eps[m], found[i]
             x, y, s, t = old[m], new[m], stress[m], tangent[min(m, last)]
@@ -231,7 +232,15 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
             if plan[KIND] == 0:
                 if plan[NORM] > 0:
                     q = trial[i, 0]
-                    slip = f[0] / q if abs(f[0]) < 1e280 * q else f[2 * n]
+                    # where the deviator is rounding of the strain, e_q/q is taken at its limit P_qq
+                    size = 0.0
+                    for j in range(6):
+                        size = max(size, abs(e[j]))
+                    slip = f[2 * n]
+                    if q > 1e-13 * abs(c[3]) * size and abs(f[0]) < 1e280 * q:
+                        slip = f[0] / q
+                    if c[plan[METRIC]] > 0.0:
+                        slip = min(max(slip, 0.0), 1.0 / c[plan[METRIC]])
                 for j in range(6):
                     flow[j] = slip * b[i, j]
             else:

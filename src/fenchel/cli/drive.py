@@ -67,12 +67,12 @@ def _drive(
     update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
     if certify and not isinstance(update, Update):
         raise InputError(
-            "--certify needs the closed form; the conic program is its own certificate: leave --certify out"
+            "--certify needs a generated step; the general method is its own certificate: leave --certify out"
         )
     history = drive(update, plan, values)
     columns: dict[str, Any] = dict(history_columns(history, plan.time))
     if certify:
-        columns["gap"] = _gaps(update, history, values)
+        columns["gap"] = _gaps(update, history, values, plan.time)
     columns = turn_columns(columns, signs)
     if output is not None:
         _write(output, csv_text(columns))
@@ -105,9 +105,19 @@ def _write(output: Path, text: str) -> None:
     replace_file(output.resolve(), text.encode())
 
 
-def _gaps(update: Update, history: History, values: dict[str, float]) -> Any:
+def _gaps(update: Update, history: History, values: dict[str, float], times: Any) -> Any:
     """Duality gap of every step: each row once more, from the state of the row before."""
     import numpy as np
 
     before = {name: np.concatenate([np.zeros_like(state[:1]), state[:-1]]) for name, state in history.state.items()}
-    return update(history.eps, before, certify=True, **values).gap
+    given: dict[str, Any] = dict(values)
+    if history.temperature is not None and update.law.temperature is not None:
+        given[update.law.temperature.name] = history.temperature
+    if not update.module.VISCOUS or len(times) < 2:
+        return update(history.eps, before, certify=True, **given).gap
+    found = []
+    for row, dt in enumerate(np.diff(times, prepend=2.0 * times[0] - times[1])):
+        state = {name: value[row : row + 1] for name, value in before.items()}
+        own = {k: v[row] if np.ndim(v) else v for k, v in given.items()}
+        found.append(update(history.eps[row], state, float(dt), certify=True, **own).gap[0])
+    return np.array(found)
