@@ -26,23 +26,24 @@ from .problem import OneStepProblem
 __all__ = ["problem_of"]
 
 Array = NDArray[np.float64]
+Index = NDArray[np.integer]
 
 
 @dataclass
 class _Rows:
     """Triplets of H, shifts w and coefficients, three rows a contact."""
 
-    row: list[Array] = field(default_factory=list)
-    dof: list[Array] = field(default_factory=list)
+    row: list[Index] = field(default_factory=list)
+    dof: list[Index] = field(default_factory=list)
     value: list[Array] = field(default_factory=list)
     shift: list[Array] = field(default_factory=list)
     mu: list[Array] = field(default_factory=list)
-    soft: list[tuple[list[Array], Array]] = field(
+    soft: list[tuple[list[Index], Array]] = field(
         default_factory=list
     )  # rows (−1 − row: reversed) that share compliances
     count: int = 0
 
-    def new(self, shift: Array, mu: Array) -> Array:
+    def new(self, shift: Array, mu: Array) -> Index:
         """Numbers of the first rows of as many contacts as `mu` has entries; `shift` (k, 3)."""
         first = self.count + 3 * np.arange(len(mu))
         self.count += 3 * len(mu)
@@ -50,7 +51,7 @@ class _Rows:
         self.mu.append(mu)
         return first
 
-    def add(self, row: Array, dof: Array, value: Array) -> None:
+    def add(self, row: Index, dof: Index, value: Array) -> None:
         self.row.append(row)
         self.dof.append(dof)
         self.value.append(value)
@@ -153,11 +154,12 @@ def _add_links(rows: _Rows, contacts: Contacts, unilateral: bool) -> None:
 
 def _frames(normal: Array) -> Array:
     """Rows normal, t₁, t₂ of each contact, shape (k, 3, 3)."""
-    helper = np.zeros_like(normal)
+    helper = np.zeros(normal.shape)
     helper[np.arange(len(normal)), np.argmin(np.abs(normal), axis=1)] = 1.0
-    t = np.cross(normal, helper)
-    t /= np.linalg.norm(t, axis=1, keepdims=True)
-    return np.stack([normal, t, np.cross(normal, t)], axis=1)
+    first = np.asarray(np.cross(normal, helper), dtype=np.float64)
+    first /= np.sqrt(np.sum(first * first, axis=1, keepdims=True))
+    second = np.asarray(np.cross(normal, first), dtype=np.float64)
+    return np.stack([normal, first, second], axis=1)
 
 
 def _compliance(inverse_sum: Array, w: Array) -> Array:
@@ -166,7 +168,7 @@ def _compliance(inverse_sum: Array, w: Array) -> Array:
     return np.where(c > 1e-13 * w, c, 0.0)
 
 
-def _join(rows: _Rows, first: Array, body: Array, frames: Array, n: int, sign: float) -> None:
+def _join(rows: _Rows, first: Index, body: Index, frames: Array, n: int, sign: float) -> None:
     """Velocity and rotation of one of the bodies in the rows: u = ± v − (r ω) × n."""
     for s in range(3):
         for axis in range(3):
@@ -177,7 +179,7 @@ def _join(rows: _Rows, first: Array, body: Array, frames: Array, n: int, sign: f
             rows.add(first + s, 3 * n + 3 * body + axis, lever[:, axis])
 
 
-def _soften(rows: _Rows, first: Array, cn: Array, ct: Array) -> None:
+def _soften(rows: _Rows, first: Index, cn: Array, ct: Array) -> None:
     """A degree of freedom of its own for every compliant row."""
     for s, c in ((0, cn), (1, ct), (2, ct)):
         held = np.flatnonzero(c > 0.0)
@@ -185,7 +187,7 @@ def _soften(rows: _Rows, first: Array, cn: Array, ct: Array) -> None:
 
 
 def _closed(rows: _Rows, inverse: Array, velocity: Array, title: str) -> OneStepProblem:
-    row, dof, value = (np.concatenate(part) for part in (rows.row, rows.dof, rows.value))
+    row, dof, value = np.concatenate(rows.row), np.concatenate(rows.dof), np.concatenate(rows.value)
     w = np.concatenate(rows.shift).ravel()
     given = inverse == 0.0  # of infinite mass, or driven: what it does is known
     moved = given[dof]
