@@ -29,7 +29,6 @@ class Phase:
     inequalities: tuple[Expr, ...] = ()
     equalities: tuple[Any, ...] = ()
     cases: tuple[tuple[str, str], ...] = ()
-    data: Expr = S.Zero
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ Each knows the coordinates (nodes) it depends on, and its conjugate at duals of 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 from sympy import Expr, S, Symbol, sqrt
@@ -264,7 +264,6 @@ class UnilateralGroup:
     eigen: EigenGroup
     lam: Expr
     mu: Expr
-    extra: list[Expr] = field(default_factory=list)
 
     @property
     def nodes(self) -> set[Node]:
