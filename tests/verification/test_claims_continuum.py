@@ -407,8 +407,8 @@ def test_claim_15_the_gap_bounds_the_error_of_any_admissible_pair(kind):
     assert smallest >= 0
 
 
-@pytest.mark.parametrize("name", LAWS)
-def test_claim_15_the_certified_gap_of_every_law_is_small(name):
+@pytest.mark.parametrize("name", {str(law.phi_star): name for name, law in LAWS.items()}.values())
+def test_claim_15_the_certified_gap_of_every_force_function_is_small(name):
     law, entry = LAWS[name], ENTRIES[name]
     update, rng = law.compile(), np.random.default_rng(153)
     out = update(moving(entry, rng, 4, 1), None, entry.worked.dt, certify=True, **entry.values, **temperatures(law))
