@@ -98,7 +98,7 @@ def solve_batch(
         failed = infeasible & (found.status[left] > ROUNDING)
         found.status[left[failed]] = INFEASIBLE
         # a residual at the level of the last digits of large data is an answer, though not to the asked tolerance
-        near = (found.status[left] == ITERATION_LIMIT) & (found.residual[left] <= 1e-11)
+        near = (found.status[left] == ITERATION_LIMIT) & (found.residual[left] <= 1e-10)
         found.status[left[near]] = ROUNDING
     return found
 

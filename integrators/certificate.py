@@ -214,5 +214,5 @@ def _term_gap(cone: Any, slack: Array, multiplier: Array) -> Array:
         elif cone.kind == ENTROPY_TERM:
             conjugate = c * k * np.exp(multiplier / c)
         else:
-            conjugate = -c + c * np.log(multiplier / c)
+            conjugate = -c - c * np.log(multiplier / c)
     return _term_value(cone, slack) + conjugate

@@ -88,7 +88,7 @@ def _canonical(
         constraints: list[Any] = []
         objective: Any = cvxpy.Constant(0.0)
         for weight, term in rest:
-            objective = objective + weighted_term(weight, term, frame, z, constraints)
+            objective = objective + weighted_term(weight, term, frame, z, constraints, inside=word != "phi_star")
             if marked and not objective.is_convex():
                 raise DeclarationError(
                     f"{where}: the term {weight:g} * ({term}) is not convex by the rules of its atoms"

@@ -239,11 +239,14 @@ def conic_expression(expression: Expr, frame: Frame, z: Any, constraints: list[A
     return total
 
 
-def weighted_term(weight: float, term: Expr, frame: Frame, z: Any, constraints: list[Any]) -> Any:
-    """weight · term; the weight of a convex power goes inside, w xⁿ = (w^(1/n) x)ⁿ, so that the cone's entries are of one size."""
+def weighted_term(
+    weight: float, term: Expr, frame: Frame, z: Any, constraints: list[Any], *, inside: bool = True
+) -> Any:
+    """weight · term. The weight of a convex power goes `inside`, w xⁿ = (w^(1/n) x)ⁿ, so that the cone's entries are of one size; where the
+    program is dualised it stays outside, unless it is extreme, so that the multipliers keep the unit of the rates."""
     if isinstance(term, Pow) and weight > 0.0 and not frame.moves(term.exp):
         exponent = frame.number(term.exp)
-        if exponent > 1.0 and exponent != 2.0:
+        if exponent > 1.0 and exponent != 2.0 and (inside or not 1e-12 < weight < 1e12):
             return _node(
                 Pow(Float(weight ** (1.0 / exponent), 17) * term.base, term.exp, evaluate=False), frame, z, constraints
             )
