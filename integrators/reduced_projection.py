@@ -41,6 +41,7 @@ __all__ = ["projection_method"]
 
 _FOLDER = kernels_hash()
 TURNS, CUTS = 80, 40
+PATIENCE = 12  # turns after which steps of some rounding units are taken for rounding
 
 
 def projection_method() -> Any:
@@ -274,7 +275,7 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
             for k in range(n):
                 for l in range(n):
                     bend += de[k] * W[k, l] * de[l]
-            if turn > 0 and missed <= close and math.sqrt(bend) <= near:
+            if turn > 0 and missed <= close and math.sqrt(bend) <= (near if turn < PATIENCE else 30.0 * near):
                 # the next step is below rounding, whatever the curvature makes of rounding in the residual
                 flag = 0
                 break

@@ -24,6 +24,7 @@ __all__ = ["single_method"]
 
 _FOLDER = kernels_hash()
 TURNS, CUTS = 80, 40
+PATIENCE = 12  # turns after which steps of some rounding units are taken for rounding
 
 
 def single_method() -> Any:
@@ -170,7 +171,7 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
             done = turn > 1 and (
                 residual <= near
                 or (residual >= 0.5 * before and residual <= close)
-                or (missed <= close and math.sqrt(bend) <= near)
+                or (missed <= close and math.sqrt(bend) <= (near if turn < PATIENCE else 30.0 * near))
             )
             if done or not bent:
                 if not done:
