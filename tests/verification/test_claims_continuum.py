@@ -4,6 +4,7 @@ What concerns every law runs over the registry. The truth is `law_truth.py` (num
 tests, quadrature and finite differences.
 """
 
+import warnings
 from itertools import pairwise
 from types import SimpleNamespace
 
@@ -359,7 +360,9 @@ def test_claim_15_return_map_of_sand_between_its_primal_and_its_dual():
     for i, eps in enumerate(strains):
         old = {key: value[i] for key, value in state.items()}
         problem, flow, mu = sand_primal(v, eps, old, cp)
-        problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10)
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # asked for more than it can reach; what was reached is compared
+            problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-10, tol_gap_rel=1e-10, tol_feas=1e-10)
         primal = problem.value / mu * v["C_0"]
         change = {key: out.state[key][i] - old[key] for key in old}
         mine = primal_value(v, eps, old, change["eps_p"], change["p"])
