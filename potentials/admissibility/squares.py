@@ -119,10 +119,10 @@ def _program(size: int, places: Any, wanted: Any) -> Any:
         constraints.append(sum(gram[a, b] for a, b in entries) == float(wanted.get(key, 0)))
     problem = cvxpy.Problem(cvxpy.Maximize(least), constraints)
     try:
-        problem.solve(solver=cvxpy.CLARABEL)
+        reached: Any = problem.solve(solver=cvxpy.CLARABEL)
     except cvxpy.SolverError:
         return None
-    return gram.value if gram.value is not None and problem.value > -1e-6 else None
+    return gram.value if gram.value is not None and reached > -1e-6 else None
 
 
 def _positive_semidefinite(rows: list[list[Rational]]) -> bool:
