@@ -561,3 +561,24 @@ def test_a_step_without_solution_says_so():
     assert update([1e-3, 0, 0, 0, 0, 0], None, 1.0, a=2e-3).stress[0] == pytest.approx(C @ [1e-3, 0, 0, 0, 0, 0])
     with pytest.raises(ConvergenceError, match="point"):
         update([1e-2, 0, 0, 0, 0, 0], None, 1.0, a=2e-3)
+
+
+def test_viscous_terms_of_different_units_beside_a_surface():
+    """Overstress in shear (cubic) and in tension (quadratic) within a ball, with a back-stress: optimality alone is the judge."""
+    shear, tension = pos(norm(dev(A + X1)) - k) ** 3 / k**2 / 1000, pos(tr(A) / 3 - k) ** 2 / (2 * eta)
+    law = Law(
+        "two_viscous",
+        psi=ELASTIC + H / 2 * inner(x1, x1),
+        phi_star=shear + tension + indicator(norm(A) - 10 * k),
+        observable=eps,
+        internal=(eps_p, x1),
+    )
+    update = law.compile(solver="general")
+    loads = strains(11, 60, -4.5, -2)
+    values = dict(k=YIELD, H=1e6, eta=1e6)
+    numbers, heat = update.arguments(values, 60)
+    found = update.solve(loads, update.packing.pack(None, 60), 0.5, numbers, heat)
+    assert (found.status == 0).all() and (found.increment != 0).any(axis=1).sum() >= 30
+    assert max(natural_map(part).max() for part in found.parts) <= 1e-11
+    out = update(loads, None, 0.5, certify=True, **values)
+    assert (out.gap <= 1e-10 * (np.einsum("ij,ij->i", loads @ C, loads) + YIELD**2 / E)).all()
