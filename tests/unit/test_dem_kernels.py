@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from fenchel.dem import Assembly, Drive, Laws, Plane, Simulation, Solver
-from fenchel.dem.candidates import matched, refresh
+from fenchel.dem.candidates import Partition, matched, refresh
 from fenchel.dem.kernels import SceneKernels
 from fenchel.dem.kernels.text import expand
 from fenchel.dem.laws import (
@@ -197,8 +197,27 @@ def test_impulses_survive_a_new_list_by_the_identity_of_the_pair() -> None:
         tuple(pair): tuple(impulse) for pair, impulse in zip(a.pairs.tolist(), a.pair_impulse.tolist(), strict=True)
     }
     assert sum(impulse[-1] > 0.0 for impulse in held.values()) > 100
-    for skin in (5e-3, 1e-4):  # a longer and a shorter list
+    for skin, longer in ((9e-3, True), (1e-6, False)):
         refresh(a, np.zeros((0, 3)), np.zeros(0), skin, 1e-4, None)
-        assert len(a.pairs) != len(held)
+        assert (len(a.pairs) > len(held)) == longer and len(a.pairs) != len(held)
         for pair, impulse in zip(a.pairs.tolist(), a.pair_impulse.tolist(), strict=True):
             assert tuple(impulse) == held.get(tuple(pair), (0.0,) * 4)
+
+
+def test_parts_that_are_swept_at_the_same_time_share_no_body() -> None:
+    rng = np.random.default_rng(6)
+    x = rng.uniform(0.0, 1.0, (300, 3)) * np.array([1.0, 3.0, 1.0])
+    pairs = np.sort(rng.integers(0, 300, (900, 2)), axis=1).astype(np.int32)
+    for parts in (2, 3):
+        partition = Partition(parts)
+        ordered = partition.sort(pairs, x)
+        assert sorted(map(tuple, ordered.tolist())) == sorted(map(tuple, pairs.tolist()))
+        assert partition.starts[0] == 0 and partition.starts[-1] == len(pairs)
+        bodies = [
+            set(ordered[a:b].ravel().tolist())
+            for a, b in zip(partition.starts[:-2], partition.starts[1:-1], strict=True)
+        ]
+        assert all(bodies) and all(not (one & other) for k, one in enumerate(bodies) for other in bodies[k + 1 :])
+        kept = np.flatnonzero(rng.uniform(size=900) < 0.5).astype(np.int32)
+        rows = partition.of_rows(kept)
+        assert rows[-1] == len(kept) and np.all(kept[rows[1] :] >= partition.starts[1])

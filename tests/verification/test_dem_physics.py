@@ -363,6 +363,17 @@ def test_a_law_from_outside_is_one_class() -> None:
             if holds:
                 assert measures["natural_map"] < 1e-12
         assert (a.velocity[1, 2] == pytest.approx(0.0, abs=1e-12)) == holds
+    for lateral, holds in (
+        (0.45, True),
+        (0.55, False),
+    ):  # the cone has its apex at −C h: friction holds up to μ C without any pressure
+        x = np.array([[0.0, 0.0, 0.02], [0.0, 0.0, 0.0]])
+        a = Assembly.of_spheres(x, np.full(2, 0.01), np.array([np.inf, 0.1]), locked=np.full(2, True))
+        simulation = Simulation(a, Laws(contact=Cohesive(friction=0.5, adhesion=1.0)), TIGHT)
+        measures = simulation.advance(1e-4, Drive(gravity=np.array([lateral / 0.1, 0.0, 0.0])))
+        assert measures["natural_map"] < 1e-12
+        slid = 0.0 if holds else 1e-4 * (lateral - 0.5) / 0.1
+        assert a.velocity[1, 0] == pytest.approx(slid, rel=1e-9, abs=1e-15)
     with pytest.raises(InputError, match="mentions colour"):
 
         @dataclass(frozen=True, kw_only=True)
