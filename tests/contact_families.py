@@ -127,7 +127,7 @@ def natural_maps(delassus: np.ndarray, q: np.ndarray, mu: np.ndarray, r: np.ndar
     for k in range(len(mu)):
         block, velocity = r[3 * k : 3 * k + 3], u[3 * k : 3 * k + 3].copy()
         velocity[0] += mu[k] * np.linalg.norm(velocity[1:])
-        for rho in (1.0, 1.0 / delassus[3 * k, 3 * k]):
+        for own, rho in ((False, 1.0), (True, 1.0 / delassus[3 * k, 3 * k])):
             z = block - rho * velocity
             size = np.linalg.norm(z[1:])
             if z[0] >= 0.0 and size <= mu[k] * z[0]:
@@ -138,8 +138,6 @@ def natural_maps(delassus: np.ndarray, q: np.ndarray, mu: np.ndarray, r: np.ndar
                 generator = np.concatenate([[1.0], mu[k] * z[1:] / size]) if size > 0.0 else np.array([1.0, 0.0, 0.0])
                 foot = generator * max(0.0, z @ generator) / (generator @ generator)
             error = float(np.sum((block - foot) ** 2))
-            if rho == 1.0:
-                plain += error
-            if rho != 1.0 or delassus[3 * k, 3 * k] == 1.0:
-                scaled += error
+            plain += 0.0 if own else error
+            scaled += error if own else 0.0
     return float(np.sqrt(plain) / np.linalg.norm(q)), float(np.sqrt(scaled) / max(np.linalg.norm(r), 1e-300))

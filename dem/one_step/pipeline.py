@@ -42,21 +42,15 @@ def solve_auto(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
         solve_admm(blocks, monitor, limit=400, patience=100)
         if _finished(monitor):
             return None
-    # large packings: the selective damping is the better one; small coupled clusters: the plain one
-    first, second = (
-        (solve_interior, solve_interior_selective) if n <= _SMALL else (solve_interior_selective, solve_interior)
-    )
+    # large packings: the selective damping and a start farther inside are the better ones; small coupled clusters: the others
+    first, starts = (solve_interior, (1.0, 10.0, 0.1)) if n <= _SMALL else (solve_interior_selective, (10.0, 1.0, 0.1))
     first(blocks, monitor, limit=150, patience=40)
     if _polished(blocks, monitor):
         return None
     proof = find_infeasibility(monitor.problem, time_limit=monitor.time_left)
     if proof is not None or _finished(monitor):
         return proof
-    if n > _SMALL:
-        second(blocks, monitor, limit=60, patience=20)
-        if _polished(blocks, monitor):
-            return None
-    for start in (1.0, 10.0, 0.1):
+    for start in starts:
         solve_homotopy(blocks, monitor, limit=3000, start=start)
         if _polished(blocks, monitor):
             return None

@@ -28,7 +28,7 @@ __all__ = ["SOLVERS", "Solution", "describe", "solve"]
 
 Array = NDArray[np.float64]
 
-TIME_LIMIT = 60.0  # s
+TIME_LIMIT = 120.0  # s
 FINEST = 1e-14  # tolerance
 
 SOLVERS: dict[str, tuple[str, Callable[[Blocks, Monitor], Infeasibility | None]]] = {

@@ -28,7 +28,7 @@ def _contact(
         1e-8, "--tolerance", metavar="T", help="What natural_map_q and natural_map_scaled shall both reach."
     ),
     time_limit: float = typer.Option(
-        60.0, "--time-limit", metavar="SECONDS", help="Processor time after which to stop."
+        120.0, "--time-limit", metavar="SECONDS", help="Processor time after which to stop."
     ),
     certify: bool = typer.Option(
         False, "--certify", help="Compare with the optimum of the cone program at the slip velocities found."
