@@ -112,6 +112,18 @@ def test_a_deposit_goes_on_bit_for_bit(start: Assembly) -> None:
     assert whole.state() == again.state()
 
 
+def test_a_settled_deposit_goes_on_bit_for_bit(settled: SlopeDeposit) -> None:
+    """Near rest the sweeps stop later: that, too, is part of the state."""
+    assert settled.tightened == 2
+    state = pickle.loads(pickle.dumps((settled.assembly.arrays(), settled.state())))
+    again = SlopeDeposit(Assembly.from_arrays(state[0]), LAW, density=DENSITY)
+    again.restore(state[1])
+    for _ in range(20):
+        assert settled.advance() == again.advance()
+    np.testing.assert_array_equal(settled.assembly.x, again.assembly.x)
+    assert settled.state() == again.state()
+
+
 def test_what_is_no_deposit(start: Assembly) -> None:
     impatient = SlopeDeposit(start.copy(), LAW, density=DENSITY, step_limit=5)
     with pytest.raises(ConvergenceError, match="step_limit"):
