@@ -20,7 +20,7 @@ pytestmark = pytest.mark.validate
 PRESSURE, RADIUS = 1e4, 1e-3
 
 
-def jammed(friction: float, seed: int, count: int = 3000) -> tuple[Assembly, float, float, float]:
+def jammed(friction: float, seed: int, count: int = 1500) -> tuple[Assembly, float, float, float]:
     """A packing at rest under the pressure of six walls: (assembly, contacts over degrees of freedom, Z, solid fraction inside).
 
     Grains are nearly rigid, k_n/(P d) = 3e4: the overlap of 1e-5 d moves Z by some 1e-2.
