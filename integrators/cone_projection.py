@@ -269,7 +269,7 @@ def power(x, y, z, alpha, jacobian):
     xs, ys, zs = x / scale, y / scale, size / scale
     # r = u zs, 0 < u < 1, by w = ln(u / (1 − u)): the equation is increasing in −w over the whole line
     low, high = -690.0, 690.0
-    w = 0.0
+    w, u, v, xn, yn = 0.0, 0.5, 0.5, 1.0, 1.0
     for _ in range(200):
         e = math.exp(-abs(w))
         u = 1.0 / (1.0 + e) if w >= 0.0 else e / (1.0 + e)

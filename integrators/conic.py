@@ -152,7 +152,7 @@ def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array
     strain_unit = 1.0 / stiffness**0.5
     e = cp.Variable(6, name="eps")
     y = cp.Variable(n) if n else None
-    point = cp.hstack([e, y]) if n else e
+    point = cp.hstack([e, y]) if y is not None else e
     scale = np.concatenate([np.full(6, strain_unit), np.ones(n)])
     M = np.block([[program.C[:6, :6], program.q1[:, :6].T], [program.q1[:, :6], np.diag(program.p)]])
     values, vectors = np.linalg.eigh(scale[:, None] * M * scale[None, :])
@@ -162,7 +162,7 @@ def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array
     objective = 0.5 * cp.sum_squares(factor @ point) + slope @ point
     shift = (program.h0 + program.h1 @ rest) / size
     strains = program.h1[:, :6] * strain_unit
-    slack = shift + strains @ e - (program.G @ y if n else 0.0) if shift.size else None
+    slack = shift + strains @ e - (program.G @ y if y is not None else 0.0) if shift.size else None
     cones, constraints = [], []
     start = 0
     for cone in program.cones:
