@@ -87,7 +87,9 @@ class ExplicitUpdate:
         if not (np.isfinite(dt) and dt > 0):
             raise InputError(f"dt = {dt}: the time step must be positive and finite")
         goal = strain_array(eps_new)
-        return _Integration(self, self.law.admissible_values(values), goal, self._packed(state, len(goal)), float(dt)).run()
+        return _Integration(
+            self, self.law.admissible_values(values), goal, self._packed(state, len(goal)), float(dt)
+        ).run()
 
     def _packed(self, state: Mapping[str, Any] | None, count: int) -> Array:
         found = self.initial_state(count) if state is None else state

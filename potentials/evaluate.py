@@ -120,7 +120,7 @@ class _Plan:
         else:
             import numpy as np
 
-            word = thing.func.__name__
+            word = str(thing.func.__name__)
             name = {"asin": "arcsin", "acos": "arccos", "atan": "arctan", "Abs": "abs"}.get(word, word)
             function = getattr(np, name, None)
             if not isinstance(thing, Expr) or function is None:

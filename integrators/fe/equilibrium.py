@@ -71,6 +71,7 @@ class Equilibrium:
         """Write a checkpoint, replaced in one move."""
         from ...errors import StorageError
 
+        states: dict[str, Any] = {f"state_{k}": v for k, v in self.state.items()}
         place = Path(path)
         part = place.with_name(place.name + ".part")
         try:
@@ -78,7 +79,7 @@ class Equilibrium:
                 np.savez(
                     file,
                     time=self.time, displacement=self.displacement, force=self.force, strain=self.strain, stress=self.stress,
-                    tangent=self.tangent, dissipation=self.dissipation, **{f"state_{k}": v for k, v in self.state.items()},
+                    tangent=self.tangent, dissipation=self.dissipation, **states,  # type: ignore[arg-type]
                 )  # fmt: skip
             part.replace(place)
         except OSError as error:
@@ -107,7 +108,7 @@ class Equilibrium:
 
 def walk(
     body: Body,
-    times: Sequence[float],
+    times: Any,
     supports: Sequence[Support] = (),
     pressures: Sequence[Pressure] = (),
     *,
@@ -136,7 +137,7 @@ def walk(
 
 def solve(
     body: Body,
-    times: Sequence[float],
+    times: Any,
     supports: Sequence[Support] = (),
     pressures: Sequence[Pressure] = (),
     **options: Any,

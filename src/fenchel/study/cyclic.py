@@ -71,7 +71,9 @@ def cyclic_compression(update: Any, values: Mapping[str, float], test: CyclicTes
     ends = 1 + 2 * test.steps * np.arange(test.loops)
     low, high = stress[ends + test.steps - 1], stress[ends + 2 * test.steps - 1]
     excess = stress + test.confinement
-    residual = np.array([_crossing(axial, excess, start + test.steps - 1, start + 2 * test.steps) for start in ends])
+    residual = np.array(
+        [_crossing(axial, excess, int(start) + test.steps - 1, int(start) + 2 * test.steps) for start in ends]
+    )
     plastic = history.state.get("p", np.zeros(axial.size))
     marks = plastic[ends + 2 * test.steps - 1]
     growth = np.diff(np.concatenate([[0.0], marks]))
