@@ -114,8 +114,7 @@ class MotionStage:
             "overlap_max": last["overlap_max"],
             "kinetic": last["kinetic"],
             "elastic": last["elastic"],
-            **self.sums,
-        }
+        } | self.sums
 
 
 QUALITY = {  # unit and meaning of what `quality` holds

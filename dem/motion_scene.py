@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 import msgspec
 import numpy as np
@@ -222,10 +222,13 @@ def check_motion_scene(scene: MotionScene, name: str = "scene") -> MotionScene:
 def planes_of(scene: MotionScene, only: int | None = None) -> list[Plane]:
     """The planes of a scene."""
     chosen = scene.plane if only is None else (scene.plane[only],)
-    return [
-        Plane(**{k: v for k, v in msgspec.structs.asdict(keys).items() if v is not None or k != "speed_limit"})
-        for keys in chosen
-    ]
+    planes = []
+    for keys in chosen:
+        given: dict[str, Any] = msgspec.structs.asdict(keys)
+        if given["speed_limit"] is None:
+            del given["speed_limit"]
+        planes.append(Plane(**given))
+    return planes
 
 
 def laws_of(scene: MotionScene) -> Laws:

@@ -38,10 +38,9 @@ def chain(
     length = float(np.linalg.norm(direction))
     if beads < 2 or not length > 0.0 or not spacing > 0.0:
         raise InputError("chain: needs two beads or more, a direction and a positive spacing")
-    x = (
-        np.asarray(start, dtype=float)
-        + spacing * np.arange(beads)[:, None] * np.asarray(direction, dtype=float) / length
-    )
+    along = spacing / length * np.asarray(direction, dtype=np.float64)
+    x = np.zeros((beads, len(along)))
+    x += np.asarray(start, dtype=np.float64) + np.arange(beads)[:, None] * along
     return x, np.full(beads, wire, dtype=np.int64), np.arange(beads, dtype=np.int64)
 
 
