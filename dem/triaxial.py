@@ -209,7 +209,7 @@ class TriaxialTest:
         return TriaxialRecord(
             pressure=self.pressure,
             seed=seed,
-            linked=self.simulation.material.links and len(self.assembly.links) > 0,
+            linked=self.simulation.kernels.wire is not None,
             leg=f["leg"],
             axial_strain=f["axial_strain"],
             wall_strain=f["wall_strain"],
@@ -253,7 +253,8 @@ class TriaxialTest:
         self.frames = {name: list(state["frames"][name]) for name in self.frames}
 
     def _quality(self, f: dict[str, Array]) -> dict[str, float]:
-        a, law = self.assembly, self.simulation.material
+        a, law = self.assembly, self.simulation.laws.contact
+        stiffness = np.inf if law is None else law.normal_stiffness()
         radius = a.grain_radius
         wall = f["wall_stress"][:, :3]
         sphere = mandel(f["moment"].sum(axis=(1, 2)) / (4.0 / 3.0 * np.pi * self.sphere**3))[:, :3]
@@ -269,7 +270,7 @@ class TriaxialTest:
             "violation_over_radius": self.peaks["violation_max"] / radius,
             "overlap_mean_over_radius": float(f["overlap_mean"].mean() / radius),
             "overlap_max_over_radius": self.peaks["overlap_max"] / radius,
-            "kappa": law.normal_stiffness / (self.pressure * 2.0 * radius),
+            "kappa": stiffness / (self.pressure * 2.0 * radius),
             "inertial_time_over_step": self.time_scale / self.step,
             "energy_error": float(np.abs(f["balance"]).max() / max(np.abs(f["external"]).max(), 1e-300)),
             "wall_box_difference": float(np.max(np.linalg.norm(f["box_stress"][:, :3] - wall, axis=1) / scale)),
