@@ -30,15 +30,17 @@ def solve_auto(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
     solve_nlgs(blocks, monitor, limit=100)
     if n <= _TINY and not _finished(monitor):
         solve_interior(blocks, monitor, limit=40)
+    coarse = monitor.tolerance >= _COARSE
     if not _finished(monitor):
-        solve_nlgs(blocks, monitor, limit=2000, patience=300)
+        # at coarse tolerances thousands of sweeps of a large problem cost what a few dozen factorisations do
+        solve_nlgs(blocks, monitor, limit=3000, patience=3000 if coarse and n > _SMALL else 300)
     if n <= _SMALL and not _finished(monitor):
         solve_anderson(blocks, monitor, limit=400, patience=100)
     if n > _LARGE and not _finished(monitor):
         solve_anderson(blocks, monitor)
     if _finished(monitor):
         return None
-    if n <= _SMALL and monitor.tolerance >= _COARSE:
+    if n <= _SMALL and coarse:
         solve_admm(blocks, monitor, limit=400, patience=100)
         if _finished(monitor):
             return None

@@ -175,7 +175,12 @@ def test_the_command_says_what_it_did_not_reach(tmp_path, capsys):
     assert told["certified"] is None
     assert "no solution" in " ".join(told["notes"])
     write_fclib(OneStepProblem.of_bodies(**spheres(0, 4)), tmp_path / "h.hdf5")
-    assert cli.main(["contact", str(tmp_path / "h.hdf5"), "--solver", "nlgs", "--tolerance", "1e-14", "--time-limit", "0.1"]) == 1
+    assert (
+        cli.main(
+            ["contact", str(tmp_path / "h.hdf5"), "--solver", "nlgs", "--tolerance", "1e-14", "--time-limit", "0.1"]
+        )
+        == 1
+    )
     out = capsys.readouterr().out
     assert "NOT CONVERGED" in out
     assert "time_limit" in out
@@ -191,7 +196,9 @@ def test_an_asymmetric_problem_is_solved_as_given_and_the_command_says_so(tmp_pa
     assert "as given" in told["notes"][0]
 
 
-@pytest.mark.parametrize("wrong", [["--solver", "magic"], ["--tolerance", "0"], ["--tolerance", "nan"], ["--time-limit", "-1"]])
+@pytest.mark.parametrize(
+    "wrong", [["--solver", "magic"], ["--tolerance", "0"], ["--tolerance", "nan"], ["--time-limit", "-1"]]
+)
 def test_wrong_options_are_misuse(tmp_path, capsys, wrong):
     write_fclib(OneStepProblem.local(W, [1.0, 0, 0], [0.1]), tmp_path / "p.hdf5")
     assert cli.main(["contact", str(tmp_path / "p.hdf5"), *wrong]) == 2
@@ -220,7 +227,12 @@ def test_problems_that_are_none():
 def test_a_full_mass_matrix_is_condensed_like_dense_algebra():
     rng = np.random.default_rng(5)
     root = rng.standard_normal((40, 40))
-    mass, h, f, w = root @ root.T + np.eye(40), rng.standard_normal((40, 9)), rng.standard_normal(40), rng.standard_normal(9)
+    mass, h, f, w = (
+        root @ root.T + np.eye(40),
+        rng.standard_normal((40, 9)),
+        rng.standard_normal(40),
+        rng.standard_normal(9),
+    )
     blocks = sp.block_diag([mass[:4, :4], mass[4:7, 4:7], mass[7:40, 7:40]])
     for m in (mass, blocks.toarray(), np.diag(np.diag(mass))):
         problem = OneStepProblem.of_bodies(m, h, f, w, np.zeros(3))
