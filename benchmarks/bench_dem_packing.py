@@ -1,6 +1,6 @@
 """Dense packings under gravity: CPU seconds per simulated second with the overlaps and the residual that were reached, rates, threads.
 
-The start states stand beside the checkout (`../shared/packings`); without them these skip. All times are CPU times of this process, since
+The start states stand beside the checkout; without them these skip. All times are CPU times of this process, since
 others may share the machine; the speed-up of two threads is that of the busier thread.
 """
 
@@ -20,7 +20,9 @@ from fenchel.dem.detection import find_pairs, spatial_order
 from fenchel.dem.laws import SignoriniCoulomb
 
 PACKING = Path(__file__).parents[2] / "shared" / "packings" / "dense10k.npz"
-needs_packing = pytest.mark.skipif(not PACKING.exists(), reason="needs ../shared/packings beside the checkout")
+needs_packing = pytest.mark.skipif(
+    not PACKING.exists(), reason="needs the start states of the packing comparison beside the checkout"
+)
 DIAMETER, STEP, G, FRICTION = 1e-2, 1e-3, 9.81, 0.5
 DOWN = Drive(gravity=np.array([0.0, 0.0, -G]))
 # thirty sweeps and a tenth of an overlap recovered per step: see the table of the first benchmark for what this reaches

@@ -119,5 +119,7 @@ def _gaps(update: Update, history: History, values: dict[str, float], times: Any
     for row, dt in enumerate(np.diff(times, prepend=2.0 * times[0] - times[1])):
         state = {name: value[row : row + 1] for name, value in before.items()}
         own = {k: v[row] if np.ndim(v) else v for k, v in given.items()}
-        found.append(update(history.eps[row], state, float(dt), certify=True, **own).gap[0])
+        gap = update(history.eps[row], state, float(dt), certify=True, **own).gap
+        assert gap is not None  # certify=True asks for it
+        found.append(gap[0])
     return np.array(found)
