@@ -185,16 +185,16 @@ class _Integration:
             2.0 * h
         )
 
-    def rate(self, strain: Array, x: Array, d_strain: Array, rows: NDArray[np.intp], active: Any) -> Array:
-        """Ẋ for strain rate `d_strain` per unit of the step."""
+    def rate(self, strain: Array, x: Array, d_strain: Array, rows: NDArray[np.intp], active: Any) -> tuple[Array, Any]:
+        """Ẋ for strain rate `d_strain` per unit of the step, and which surfaces flow."""
         y = self.forces(strain, x)
         flow = self.dt * self._pack(self.creep, self._environment(y, rows), len(x)) if self.creep else np.zeros_like(x)
         if not active.any():
-            return flow
+            return flow, active
         normals = np.where(active[:, :, None], self.normals(y, rows), 0.0)
         drive = np.einsum("njk,nk->nj", normals, self._along(strain, x, d_strain, flow))
         gamma = self._multipliers(strain, x, normals, drive)
-        return flow + np.einsum("nj,njk->nk", gamma, normals)
+        return flow + np.einsum("nj,njk->nk", gamma, normals), gamma > 0.0
 
     def _multipliers(self, strain: Array, x: Array, normals: Array, drive: Array) -> Array:
         """γ ≥ 0 with drive − A γ ≤ 0 complementary, A_jk = −∂f_j·(∂Y/∂X)·∂f_k, by projected Gauss–Seidel."""
@@ -269,18 +269,16 @@ class _Integration:
             else np.zeros((len(x), 0))
         )
         active = self.surfaces(y0, rows) >= -near
-        first = self.rate(strain, x, whole, rows, active)
+        first, flowing = self.rate(strain, x, whole, rows, active)
         euler = x + column * first
         y1 = self.forces(end, euler)
         late = active | (self.surfaces(y1, rows) > near)
-        second = self.rate(end, euler, whole, rows, late)
+        second, _ = self.rate(end, euler, whole, rows, late)
         moved = x + 0.5 * column * (first + second)
-        # surfaces met within the sub-step: it begins elastic and must be short
-        wrong = (
-            (late & ~active).any(axis=1)
-            & (step > 1e-3 * self.update.tolerance**0.5)
-            & ~self._small(strain, x, end, rows, near)
-        )
+        # a surface met within the sub-step, from inside or after leaving it: the sub-step begins elastic there and must be short
+        met = ((self.surfaces(y1, rows) > near) & ~flowing).any(axis=1)
+        long = (step > 1e-3 * self.update.tolerance**0.5) & ~self._small(strain, x, end, rows, near)
+        wrong = met & long
         moved = self._returned(end, moved, rows)
         y = self.forces(end, moved)
         stress_two = evaluate(self.law.stress, self._state(end, moved))

@@ -28,6 +28,7 @@ __all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
 Array = NDArray[np.float64]
 REDUCED = ("closed", "reduced", "principal")
 GENERAL = ("general", "conic", "cvxpy")
+EXPLICIT = "explicit"
 
 
 @dataclass(frozen=True)
@@ -209,11 +210,17 @@ def build_update(
         raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
     if formulation != "strain":
         raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
-    if solver not in ("auto", *REDUCED, *GENERAL):
-        raise InputError(f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL))}")
+    if solver not in ("auto", *REDUCED, *GENERAL, EXPLICIT):
+        raise InputError(
+            f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL, EXPLICIT))}"
+        )
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
+    if solver == EXPLICIT:
+        from .explicit import ExplicitUpdate
+
+        return ExplicitUpdate(law)
     why = "asked for by name"
     if solver == "auto" or solver in REDUCED:
         try:

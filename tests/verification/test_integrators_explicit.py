@@ -27,27 +27,29 @@ def test_radial_path_of_a_metal_is_exact_to_its_tolerance():
     G = METAL["E"] / 2.6
     p = (np.sqrt(3) * G * gamma - METAL["sigma_y"]) / (3 * G + METAL["H_i"])
     tau = (METAL["sigma_y"] + METAL["H_i"] * p) / np.sqrt(3)
-    out = walked(ExplicitUpdate(von_mises, 1e-6), [strain], **METAL)
+    update = von_mises.compile("3d", solver="explicit")
+    assert update.solver == "explicit"
+    out = walked(update, [strain], **METAL)
     assert out.stress[0, 5] / np.sqrt(2) == pytest.approx(tau, rel=1e-5)
     assert out.state["p"][0] == pytest.approx(p, rel=1e-5)
     assert out.tangent is None
 
 
 def test_error_control_keeps_its_promise():
-    """A path that turns: the error against a far tighter run falls with the tolerance and stays below a hundred times it."""
+    """A path that turns, leaves the surface and meets it again on another side: the error falls with the tolerance, and implicit Euler
+    tends to the same path with its steps."""
     rng = np.random.default_rng(2)
     turns = 2e-3 * rng.normal(size=(4, 5, 6)) - 1e-3 * np.array([1, 1, 1, 0, 0, 0])
-    path = list(np.cumsum(0.5 * turns, axis=0))
-    reference = walked(ExplicitUpdate(sand, 1e-8), path, **SAND).stress
+    path = [strain[3:] for strain in np.cumsum(0.5 * turns, axis=0)]
+    fine = [
+        a + (b - a) * k / 1000 for a, b in zip([0 * path[0], *path[:-1]], path, strict=True) for k in range(1, 1001)
+    ]
+    reference = walked(sand.compile("3d", tangent=False), fine, **SAND).stress
     scale = np.abs(reference).max()
     errors = [
-        np.abs(walked(ExplicitUpdate(sand, t), path, **SAND).stress - reference).max() / scale for t in (1e-3, 1e-5)
+        np.abs(walked(ExplicitUpdate(sand, t), path, **SAND).stress - reference).max() / scale for t in (1e-2, 1e-4)
     ]
     assert errors[0] < 0.1 and errors[1] < 1e-3 and errors[1] < 0.3 * errors[0]
-    # implicit Euler tends to the same path with its steps
-    fine = [a + (b - a) * k / 200 for a, b in zip([0 * path[0], *path[:-1]], path, strict=True) for k in range(1, 201)]
-    implicit = walked(sand.compile("3d", tangent=False), fine, **SAND).stress
-    assert np.abs(implicit - reference).max() < 5e-3 * scale
 
 
 def test_viscous_relaxation_has_its_closed_form():
