@@ -12,14 +12,15 @@ from sympy import Expr, S
 from ..potentials import Law
 from ..potentials.printer import number_code
 from .coefficients import Numbers, closed_numbers, is_closed, is_single, reduced_numbers, strain_numbers
+from .declared import state_layout
 from .plan import STRAIN_START
 from .reduced_structure import Reduction, find_reduction
 from .reduced_text import RATE_TIME, function_text
 from .rest_text import rest_text
-from .structure import NoReduction, state_layout
+from .structure import NoReduction
 from .writer import Writer
 
-__all__ = ["closed_module", "state_layout"]
+__all__ = ["closed_module"]
 
 WHY = {
     "closed": "one surface, affine in one deviator norm, traces and scalar forces: the step is in closed form",

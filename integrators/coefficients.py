@@ -10,8 +10,9 @@ from dataclasses import dataclass, field
 from sympy import Expr, S
 
 from . import plan
+from .declared import state_layout
 from .reduced_structure import Q, Reduction, is_curved
-from .structure import internal_scalars, internal_tensors, state_layout
+from .structure import internal_scalars, internal_tensors
 
 __all__ = ["Numbers", "closed_numbers", "is_closed", "is_single", "reduced_numbers", "strain_numbers"]
 

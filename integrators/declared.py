@@ -24,7 +24,7 @@ from ..potentials.tensor import TensorSymbol
 from ..potentials.vector import VectorSymbol
 from .strain_energy import StrainEnergy, without_strain_terms
 
-__all__ = ["DeclaredStep", "components", "declared_step", "packed_layout", "strain_flows"]
+__all__ = ["DeclaredStep", "components", "declared_step", "packed_layout", "state_layout", "strain_flows"]
 
 Array = NDArray[np.float64]
 
@@ -34,16 +34,20 @@ def components(variable: Any) -> int:
     return {2: 6, 1: 3}.get(getattr(variable, "rank", 0), 1)
 
 
-def packed_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
-    """Place (start, length) of each internal variable in a packed state row, and the number of their components.
-
-    A law with a force (or rate) of its observable keeps the old strain behind them, under the observable's own name.
-    """
+def state_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
+    """Place (start, length) of every internal variable in a packed state row, as declared, and the number of their components."""
     layout: dict[str, tuple[int, int]] = {}
     start = 0
     for variable in law.internal:
         layout[variable.name] = (start, components(variable))
         start += components(variable)
+    return layout, start
+
+
+def packed_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
+    """As `state_layout`; a law with a force (or rate) of its observable keeps the old strain behind, under the observable's own name,
+    which is not counted."""
+    layout, start = state_layout(law)
     if strain_flows(law):
         layout[law.observable.name] = (start, 6)
     return layout, start

@@ -54,7 +54,8 @@ class StatePacking:
                 )
         for name, (start, length) in self.layout.items():
             if name not in state:
-                raise InputError(f"law '{self.law.name}': the state lacks the variable '{name}'")
+                word = "variable" if name == self.law.observable.name else "internal variable"
+                raise InputError(f"law '{self.law.name}': the state lacks the {word} '{name}'")
             value = np.asarray(state[name], dtype=float)
             shape = (point_count,) if length == 1 else (point_count, length)
             if value.shape != shape:

@@ -23,7 +23,7 @@ from ..potentials.derivative import invariants_of, partial, second_derivative, v
 from ..potentials.scalars import ScalarVariable, Temperature
 from ..potentials.tensor import TensorSymbol, identity
 
-__all__ = ["Moduli", "NoReduction", "find_moduli", "internal_scalars", "internal_tensors", "is_data", "state_layout"]
+__all__ = ["Moduli", "NoReduction", "find_moduli", "internal_scalars", "internal_tensors", "is_data"]
 
 Pair = tuple[Expr, Expr]
 
@@ -74,16 +74,6 @@ def internal_tensors(law: Law) -> tuple[TensorSymbol, ...]:
 def internal_scalars(law: Law) -> tuple[ScalarVariable, ...]:
     """Scalar internal variables, in declared order."""
     return tuple(v for v in law.internal if isinstance(v, ScalarVariable))
-
-
-def state_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
-    """Place (start, length) of every internal variable in the packed state, as declared, and the total length."""
-    layout, start = {}, 0
-    for variable in law.internal:
-        length = 1 if isinstance(variable, ScalarVariable) else 6 if isinstance(variable, TensorSymbol) else 3
-        layout[variable.name] = (start, length)
-        start += length
-    return layout, start
 
 
 def find_moduli(law: Law) -> Moduli:

@@ -18,9 +18,11 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
+from .declared import state_layout
 from .module_store import load_module
+from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
-from .structure import NoReduction, state_layout
+from .structure import NoReduction
 from .thermal import thermal_input, thermal_results
 
 __all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
@@ -62,42 +64,22 @@ class Update:
     state_size: int = 0
     why: str = ""
 
+    @cached_property
+    def packing(self) -> StatePacking:
+        """The state by name and in packed rows."""
+        return StatePacking(self.law, self.layout, self.state_size)
+
     def initial_state(self, point_count: int = 1) -> dict[str, Array]:
         """Virgin state: all internal variables zero."""
-        if point_count < 0:
-            raise InputError(f"initial_state: the number of points is {point_count}; it must not be negative")
-        return self.unpack(np.zeros((point_count, self.state_size)))
+        return self.packing.initial_state(point_count)
 
     def unpack(self, packed: Array) -> dict[str, Array]:
         """Views of a packed state (n, state_size) by name."""
-        return {n: packed[:, s] if length == 1 else packed[:, s : s + length] for n, (s, length) in self.layout.items()}
+        return self.packing.unpack(packed)
 
     def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
         """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""
-        packed = np.zeros((point_count, self.state_size))
-        if state is None:
-            return packed
-        for name in state:
-            if name not in self.layout:
-                raise InputError(
-                    f"law '{self.law.name}' has no internal variable '{name}'; it has: {', '.join(self.layout) or 'none'}"
-                )
-        for name, (start, length) in self.layout.items():
-            if name not in state:
-                raise InputError(f"law '{self.law.name}': the state lacks the internal variable '{name}'")
-            value = np.asarray(state[name], dtype=float)
-            shape = (point_count,) if length == 1 else (point_count, length)
-            if value.shape != shape:
-                try:
-                    value = np.broadcast_to(value, shape)
-                except ValueError:
-                    raise InputError(
-                        f"state '{name}' has shape {value.shape}; for {point_count} points it must be {shape}"
-                    ) from None
-            if not np.isfinite(value).all():
-                raise InputError(f"state '{name}' holds a value that is not finite")
-            packed[:, start : start + length] = value.reshape(point_count, length)
-        return packed
+        return self.packing.pack(state, point_count)
 
     @cached_property
     def pointers(self) -> StepPointers:

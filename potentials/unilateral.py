@@ -52,15 +52,11 @@ def unilateral_conjugate(stress: Any, lam: float, mu: float, *, rounding: float 
 def _eigenvalues(tensor: Any, lam: float, mu: float) -> tuple[Any, Any]:
     import numpy as np
 
+    from .spectral import eigenvalues
+
     if not (np.isfinite(lam) and lam >= 0.0 and np.isfinite(mu) and mu > 0.0):
         raise InputError(f"a unilateral energy needs lambda >= 0 and mu > 0, not lambda = {lam:g}, mu = {mu:g}")
     found = np.asarray(tensor, dtype=float)
     if found.ndim not in (1, 2) or found.shape[-1] != 6 or not np.isfinite(found).all():
         raise InputError(f"a tensor has shape {found.shape}; it must be (n, 6) or (6,), finite Mandel components")
-    half = np.sqrt(0.5)
-    matrix = np.empty((*found.shape[:-1], 3, 3))
-    for i in range(3):
-        matrix[..., i, i] = found[..., i]
-    for place, (i, j) in zip((3, 4, 5), ((1, 2), (0, 2), (0, 1)), strict=True):
-        matrix[..., i, j] = matrix[..., j, i] = half * found[..., place]
-    return found, np.linalg.eigvalsh(matrix)
+    return found, eigenvalues(found)
