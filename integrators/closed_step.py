@@ -10,7 +10,8 @@ and tr ΔX_k = 3 b_k γ, Δs_j = r_j γ in both; the dissipation is k γ. That t
 from convexity. The tangent is c₀ 𝕀 + c₁ I⊗I + c₂ B⊗B + c₃ (B⊗I + I⊗B). Compiled once per machine: a law enters through numbers.
 
 Coefficients: a, w_q, w_m, g_q, g_T, f at zero, k, stiffness pair, stress at zero; per tensor k_B, k_T, a_k, b_k, moduli pair; per scalar
-k_s, r_j; then those of `strain_terms`. Plan: tensors, scalars, strain terms or not, then the places in the packed state.
+k_s, r_j; then those of `strain_terms`. Plan: tensors, scalars, strain terms (1) or not (0), then the places in the packed state. With -1
+the numbers are those of a conjugate, -psi* over stresses, and stress and tangent change sign: they are strain and compliance.
 """
 
 from __future__ import annotations
@@ -110,6 +111,8 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
         sphere -= g_t * gamma
         s0, s1, s2 = s0 - w * b0 + sphere, s1 - w * b1 + sphere, s2 - w * b2 + sphere
         s3, s4, s5 = s3 - w * b3, s4 - w * b4, s5 - w * b5
+        if terms < 0:
+            s0, s1, s2, s3, s4, s5 = -s0, -s1, -s2, -s3, -s4, -s5
         s = stress[m]
         s[0], s[1], s[2], s[3], s[4], s[5] = s0, s1, s2, s3, s4, s5
         dissipation[m] = gamma * c[6]
@@ -119,6 +122,8 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
             c1 = s_1 + drop * third - g_t * g_t * p_tt
             c2 = (drop - g_q * g_q * p_qq) * inverse * inverse
             c3 = -g_q * g_t * p_qt * inverse
+            if terms < 0:
+                c0, c1, c2, c3 = -c0, -c1, -c2, -c3
             u0, u1, u2, u3, u4, u5 = c2 * b0 + c3, c2 * b1 + c3, c2 * b2 + c3, c2 * b3, c2 * b4, c2 * b5
             d0, d1, d2, d3, d4, d5 = c3 * b0 + c1, c3 * b1 + c1, c3 * b2 + c1, c3 * b3, c3 * b4, c3 * b5
             t[0], t[1], t[2] = u0 * b0 + d0 + c0, u0 * b1 + d0, u0 * b2 + d0

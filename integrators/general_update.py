@@ -92,7 +92,7 @@ class GeneralUpdate:
         named = self.packing.unpack(new)
         entropy, flux = thermal_results(self.law, heat, eps, named, given)
         stress = found.slopes[:, :6].copy()
-        return StepResult(stress, found.tangent, named, lost, found.status, gap, entropy, flux)
+        return StepResult(stress, found.tangent, named, lost, found.status, gap, entropy, flux, eps)
 
     def arguments(self, values: Mapping[str, Any], count: int) -> tuple[dict[str, float], Array | None]:
         """Checked parameters by name, and the temperature at every point."""

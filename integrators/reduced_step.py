@@ -274,5 +274,11 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
                     _principal_tangent(c, plan, axes[i], f, t, dyads)
             if plan[STRAIN] > 0:
                 rest(e, s, work, c[plan[STRAIN_START] :], want, t)
+            elif plan[STRAIN] < 0:
+                for j in range(6):
+                    s[j] = -s[j]
+                if want:
+                    for j in range(36):
+                        t[j] = -t[j]
             if status[m] == 0 and not math.isfinite(s[0] + s[1] + s[2] + s[3] + s[4] + s[5]):
                 status[m] = 2

@@ -37,8 +37,9 @@ EXPLICIT = "explicit"
 class StepResult:
     """Result of one step at n points.
 
-    `stress` [Pa] (n, 6) and `tangent` [Pa] (n, 6, 6) in Mandel components; `state` by name, tensors (n, 6), scalars (n,);
+    `stress` [Pa] (n, 6) and `tangent` ∂σ/∂ε [Pa] (n, 6, 6) in Mandel components; `state` by name, tensors (n, 6), scalars (n,);
     `dissipation` of the step [J/m³] (n,), mechanical; `status` (n,) of `Status` codes; `gap` [J/m³] (n,), primal minus dual, if certified.
+    `strain` [-] (n, 6) at the end of the step: the given one, or in the stress formulation the answer, with `tangent` ∂ε/∂σ [1/Pa].
     Of a law with a temperature: `entropy` [J/(m³ K)] (n,), and `flux` −q/T [W/(m² K)] (n, 3) if φ* mentions the gradient of temperature.
     """
 
@@ -50,6 +51,7 @@ class StepResult:
     gap: Array | None = None
     entropy: Array | None = None
     flux: Array | None = None
+    strain: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -123,7 +125,7 @@ class Update:
         found = self.unpack(new)
         entropy, flux = thermal_results(self.law, heat, eps, found, values)
         shaped = tangent.reshape(n, 6, 6) if self.tangent else None
-        return StepResult(stress, shaped, found, dissipation, status, gap, entropy, flux)
+        return StepResult(stress, shaped, found, dissipation, status, gap, entropy, flux, eps)
 
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
         """Free energy ρψ [J/m³] at the given strains and internal variables, shape (n,)."""
