@@ -22,6 +22,7 @@ from .writer import Writer
 
 __all__ = ["closed_module"]
 
+_SHORT = {6: "", 4: " 11, 22, 33, 12", 3: " 11, 22, 33"}
 WHY = {
     "closed": "one surface, affine in one deviator norm, traces and scalar forces: the step is in closed form",
     "reduced": "tensor forces enter through one deviator norm and traces: the step is a projection of a few numbers",
@@ -29,16 +30,16 @@ WHY = {
 }
 
 
-def closed_module(law: Law, solver: str = "auto") -> str:
-    """Text of the generated module; raises `NoReduction` with the reason if the law has no step of that kind."""
+def closed_module(law: Law, solver: str = "auto", size: int = 6) -> str:
+    """Text of the generated module for tensors of `size` components; `NoReduction` says why a law has no step of that kind."""
     reduction = find_reduction(law)
     _check_kind(reduction, solver)
     functions: list[str] = []
     own: list[Expr] = []
     if is_closed(reduction) and solver in ("auto", "closed"):
-        numbers, method = closed_numbers(reduction), "closed"
+        numbers, method = closed_numbers(reduction, size), "closed"
     else:
-        numbers = reduced_numbers(reduction)
+        numbers = reduced_numbers(reduction, size)
         method = "principal" if reduction.kind == "principal" else "reduced"
         if reduction.affine:
             _affine(numbers, reduction)
@@ -47,10 +48,10 @@ def closed_module(law: Law, solver: str = "auto") -> str:
             numbers.add("constants of functions_", *own)
         numbers.plan[STRAIN_START] = strain_numbers(numbers, reduction)
     if reduction.moduli.rest != 0:
-        rest, constants = rest_text(law, reduction.moduli.rest)
+        rest, constants = rest_text(law, reduction.moduli.rest, size)
         functions = functions + rest
         numbers.add("constants of rest_", *constants)
-    return _module(law, reduction, numbers, method, functions)
+    return _module(law, reduction, numbers, method, functions, size)
 
 
 def _check_kind(reduction: Reduction, solver: str) -> None:
@@ -79,23 +80,27 @@ def _affine(numbers: Numbers, reduction: Reduction) -> None:
         numbers.add(f"surface {i}: normal, value at zero", *(f.diff(z) for z in reduction.unknowns), rest)
 
 
-def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, functions: list[str]) -> str:
-    _, size = state_layout(law)
-    energy, spectral = _energy(law)
-    imports = [f"from fenchel.integrators.spectral import {', '.join(spectral)}"] if spectral else []
+def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, functions: list[str], size: int) -> str:
+    _, width = state_layout(law, size)
+    energy, spectral = _energy(law, size)
+    source = "spectral" if size == 6 else "spectral_plane"
+    point = [name for name in spectral if name == "norm_of"]
+    spectral = [name for name in spectral if name not in point]
+    imports = [f"from fenchel.integrators.kernels.point import {', '.join(point)}"] if point else []
+    imports += [f"from fenchel.integrators.{source} import {', '.join(spectral)}"] if spectral else []
     if functions:
         imports = ["from fenchel.integrators.kernel_types import LAW_SIGNATURE", *imports]
     described = {
-        "closed": "closed form (`fenchel.integrators.closed_step`)",
+        "closed": "closed form (`fenchel.integrators.kernels.closed_text`)",
         "reduced": "projection in "
         + ", ".join(map(str, reduction.unknowns))
-        + " (`fenchel.integrators.reduced_step`), q_ = |dev B|, t_ traces",
-        "principal": "projection in the principal values of B and scalar forces (`fenchel.integrators.reduced_step`)",
+        + " (`fenchel.integrators.kernels.reduced_text`), q_ = |dev B|, t_ traces",
+        "principal": "projection in the principal values of B and scalar forces (`fenchel.integrators.kernels.reduced_text`)",
     }[method]
     text = [
         f'"""Implicit step of the law `{law.name}`, written by fenchel: {described}.',
         "",
-        "Strain [-] and stress [Pa] in Mandel components.",
+        f"Strain [-] and stress [Pa] in Mandel components{_SHORT[size]}.",
         "",
         *law.text.splitlines(),
         '"""',
@@ -110,7 +115,8 @@ def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, funct
         'FOLDER = __name__.rpartition("_")[2]',
         f'METHOD = "{_method(reduction, method)}"',
         f'WHY = "{WHY[method]}"',
-        f"STATE_SIZE = {size}",
+        f"COMPONENTS = {size}",
+        f"STATE_SIZE = {width}",
         f"VISCOUS = {reduction.finite != 0 or reduction.soft is not None}",
         f"STRAIN_ENERGY = {reduction.moduli.alone}",
         f"OWN_STRAIN_ENERGY = {reduction.moduli.rest != 0}",
@@ -150,12 +156,12 @@ def array_code(expression: Expr) -> str:
     return number_code(expression).replace("math.", "np.").replace("max(", "np.maximum(")
 
 
-def _energy(law: Law) -> tuple[list[str], list[str]]:
+def _energy(law: Law, size: int) -> tuple[list[str], list[str]]:
     """`energy_` and the spectral functions it calls."""
     constants: dict[Expr, str] = {}
-    writer = Writer(constants)
+    writer = Writer(constants, size)
     code = writer.code(law.energy)
-    layout, _ = state_layout(law)
+    layout, _ = state_layout(law, size)
     views = []
     for name, (start, length) in layout.items():
         views.append(

@@ -1,6 +1,7 @@
 """The numbers through which a law enters the compiled steps: places in the state, and coefficients as expressions in parameters, dt and T.
 
-`closed_numbers` lays them out for `closed_step`, `reduced_numbers` for `reduced_step`; what the integers and the groups mean stands there.
+`closed_numbers` lays them out for `kernels.closed_text`, `reduced_numbers` for `kernels.reduced_text`; what integers and groups mean stands
+there.
 """
 
 from __future__ import annotations
@@ -72,11 +73,11 @@ def strain_numbers(numbers: Numbers, reduction: Reduction) -> int:
     return start
 
 
-def closed_numbers(reduction: Reduction) -> Numbers:
-    """Plan and coefficients for `closed_step`."""
+def closed_numbers(reduction: Reduction, size: int = 6) -> Numbers:
+    """Plan and coefficients of a closed step; the places are those of a state with tensors of `size` components."""
     law, moduli = reduction.law, reduction.moduli
     tensors, scalars = internal_tensors(law), internal_scalars(law)
-    layout, _ = state_layout(law)
+    layout, _ = state_layout(law, size)
     f = reduction.surfaces[0] if reduction.surfaces else S.NegativeOne
     slope = {z: f.diff(z) for z in reduction.unknowns}
     a = slope.get(Q, S.Zero)
@@ -127,11 +128,11 @@ def _constant(slope: Expr, scalars: tuple[Expr, ...]) -> Expr:
     return slope.xreplace(dict.fromkeys(scalars, S.Zero))
 
 
-def reduced_numbers(reduction: Reduction) -> Numbers:
-    """Plan and coefficients for `reduced_step`, without those of the method's own functions."""
+def reduced_numbers(reduction: Reduction, size: int = 6) -> Numbers:
+    """Plan and coefficients of a reduced step, without those of the method's own functions."""
     law, moduli = reduction.law, reduction.moduli
     tensors, scalars = internal_tensors(law), internal_scalars(law)
-    layout, _ = state_layout(law)
+    layout, _ = state_layout(law, size)
     n = len(tensors)
     weights = reduction.weights
     c0 = [[p[0] for p in row] for row in moduli.tensors]

@@ -29,27 +29,28 @@ __all__ = ["DeclaredStep", "components", "declared_step", "packed_layout", "stat
 Array = NDArray[np.float64]
 
 
-def components(variable: Any) -> int:
-    """Number of components of a variable: 6 (Mandel), 3 or 1."""
-    return {2: 6, 1: 3}.get(getattr(variable, "rank", 0), 1)
+def components(variable: Any, size: int = 6) -> int:
+    """Number of components of a variable: `size` of a tensor (6, Mandel, unless said), 3 or 1."""
+    return {2: size, 1: 3}.get(getattr(variable, "rank", 0), 1)
 
 
-def state_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
-    """Place (start, length) of every internal variable in a packed state row, as declared, and the number of their components."""
+def state_layout(law: Law, size: int = 6) -> tuple[dict[str, tuple[int, int]], int]:
+    """Place (start, length) of every internal variable in a packed state row, as declared, and the number of their components;
+    `size` is that of a tensor."""
     layout: dict[str, tuple[int, int]] = {}
     start = 0
     for variable in law.internal:
-        layout[variable.name] = (start, components(variable))
-        start += components(variable)
+        layout[variable.name] = (start, components(variable, size))
+        start += components(variable, size)
     return layout, start
 
 
-def packed_layout(law: Law) -> tuple[dict[str, tuple[int, int]], int]:
+def packed_layout(law: Law, size: int = 6) -> tuple[dict[str, tuple[int, int]], int]:
     """As `state_layout`; a law with a force (or rate) of its observable keeps the old strain behind, under the observable's own name,
     which is not counted."""
-    layout, start = state_layout(law)
+    layout, start = state_layout(law, size)
     if strain_flows(law):
-        layout[law.observable.name] = (start, 6)
+        layout[law.observable.name] = (start, size)
     return layout, start
 
 

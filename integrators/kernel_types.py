@@ -2,7 +2,8 @@
 
     LAW     law(a, b, d, c, level, out): a generated function of a law, see `reduced_text` and `rest_text`;
     METHOD  method(law, trial, coefficients, first, plan, found, status, count): the reduced projection at `count` points;
-    STEP    step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, status, coefficients, plan): the whole step.
+    STEP    step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, status, coefficients, plan): the whole step;
+            STEP_SIGNATURE_32 is that of arrays of float32.
 
 Arrays have the point index first; a tangent is a row of 36. `coefficients` has one row for all points, or one row per point.
 """
@@ -27,6 +28,7 @@ __all__ = [
     "ROW",
     "STEP",
     "STEP_SIGNATURE",
+    "STEP_SIGNATURE_32",
     "TABLE",
     "compiled",
     "no_law",
@@ -45,12 +47,17 @@ STEP_SIGNATURE = types.void(
     METHOD, LAW, LAW, TABLE, TABLE, TABLE, TABLE, TABLE, types.int64, ROW, PLACES, TABLE, PLACES
 )
 STEP = types.FunctionType(STEP_SIGNATURE)
+ROW_32 = types.Array(types.float32, 1, "C")
+TABLE_32 = types.Array(types.float32, 2, "C")
+STEP_SIGNATURE_32 = types.void(
+    METHOD, LAW, LAW, TABLE_32, TABLE_32, TABLE_32, TABLE_32, TABLE_32, types.int64, ROW_32, PLACES, TABLE, PLACES
+)
 
 
 @functools.cache
 def compiled(function: Callable[..., Any], signature: Any) -> Any:
     """The function compiled (or read from disk) for one signature, when it is first asked for."""
-    return njit(folder=kernels_hash(), signature_or_function=signature)(function)
+    return njit(folder=kernels_hash(), signature_or_function=signature, nogil=True)(function)
 
 
 def _no_law(a, b, d, c, level, out):

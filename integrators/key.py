@@ -50,10 +50,11 @@ def files_hash(*names: str) -> str:
 
 @functools.cache
 def kernels_hash() -> str:
-    """Hash of the files whose compiled functions call each other: those that name this function or compile a pointer, and their plan."""
+    """Hash of the files whose compiled functions call each other: those that import this function or compile a pointer, and their plan."""
     names = []
-    for file in Path(__file__).parent.glob("*.py"):
+    root = Path(__file__).parent
+    for file in root.rglob("*.py"):
         data = file.read_bytes()
-        if b"kernels_hash" in data or b"compiled(" in data or file.name == "plan.py":
-            names.append(file.name)
+        if b"import kernels_hash" in data or b"compiled(" in data or file.name == "plan.py":
+            names.append(str(file.relative_to(root)))
     return files_hash(*names)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..potentials import Law
 from .declared import packed_layout
+from .dimension import Dimension
 
 __all__ = ["StatePacking"]
 
@@ -27,9 +28,9 @@ class StatePacking:
     state_size: int
 
     @classmethod
-    def of(cls, law: Law) -> StatePacking:
-        """Layout of a law."""
-        layout, _ = packed_layout(law)
+    def of(cls, law: Law, size: int = 6) -> StatePacking:
+        """Layout of a law with tensors of `size` components."""
+        layout, _ = packed_layout(law, size)
         return cls(law, layout, sum(length for _, length in layout.values()))
 
     def initial_state(self, point_count: int = 1) -> dict[str, Array]:
@@ -39,8 +40,18 @@ class StatePacking:
         return self.unpack(np.zeros((point_count, self.state_size)))
 
     def unpack(self, packed: Array) -> dict[str, Array]:
-        """Views of packed rows (n, state_size) by name: scalars (n,), vectors (n, 3), tensors (n, 6)."""
+        """Views of packed rows (n, state_size) by name: scalars (n,), vectors (n, 3), tensors (n, size)."""
         return {n: packed[:, s] if length == 1 else packed[:, s : s + length] for n, (s, length) in self.layout.items()}
+
+    def whole(self, packed: Array, dimension: Dimension) -> Array:
+        """Rows of the same states in three dimensions."""
+        if dimension.size == 6:
+            return packed
+        tensors = {v.name for v in (*self.law.internal, self.law.observable) if getattr(v, "rank", 0) == 2}
+        found = [
+            dimension.embedded(v) if n in tensors else v.reshape(len(v), -1) for n, v in self.unpack(packed).items()
+        ]
+        return np.hstack(found) if found else packed
 
     def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
         """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""

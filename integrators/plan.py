@@ -3,9 +3,9 @@
 `KIND` 0 norm and traces, 1 principal values; `TENSORS`, `SCALARS` internal variables; `UNKNOWNS` reduced forces, of which `NORM` (0 or 1)
 a deviator norm, `TRACES` traces, `MOVING` scalar forces from place `FIRST_SCALAR`; `FROZEN` scalars; `SURFACES` (the function of the power
 terms first, if `SOFT`), `ORDERS` constraints of the reduction itself; `VISCOUS` a smooth finite part, `CURVED` surfaces, `NONLINEAR`
-hardening, `STRAIN` an energy of the strain alone (1; with -1 the numbers are those of -psi* over stresses, and strain and compliance come out
-with their sign turned): flags. `*_START`, `METRIC`, `LINES`: places among the coefficients. From `PLACES`: where tensors, scalars, moving
-scalars and frozen scalars stand in a packed state.
+hardening, `STRAIN` an energy of the strain alone (1; with -1 the numbers are those of -psi* over stresses, and strain and compliance come
+out with their sign turned): flags. `*_START`, `METRIC`, `LINES`: places among the coefficients. From `PLACES`: places of tensors, scalars,
+moving and frozen scalars in a packed state.
 """
 
 from __future__ import annotations

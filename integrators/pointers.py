@@ -10,14 +10,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .closed_step import closed_step
 from .kernel_types import no_law, no_method
+from .kernels import step_kernel, terms_kernel
 from .plan import KIND, LINES, METHOD_START, METRIC, ORDERS, SURFACES, UNKNOWNS
 from .reduced_affine import affine_method, face_table
 from .reduced_projection import projection_method
 from .reduced_single import single_method
-from .reduced_step import reduced_step
-from .strain_terms import unilateral_terms
 
 __all__ = ["StepPointers", "step_pointers"]
 
@@ -87,15 +85,17 @@ class StepPointers:
         return face_table(normals, limits, row[metric : metric + n * n].reshape(n, n))
 
 
-def step_pointers(module: ModuleType) -> StepPointers:
-    """Pointers of a generated module."""
+def step_pointers(module: ModuleType, precision: str = "float64") -> StepPointers:
+    """Pointers of a generated module, for arrays of a precision."""
     plan = np.array(module.PLAN, dtype=np.int64)
-    method = module.METHOD
-    rest = module.rest_ if module.OWN_STRAIN_ENERGY else unilateral_terms() if module.STRAIN_ENERGY else no_law()
+    method, size = module.METHOD, module.COMPONENTS
+    rest = module.rest_ if module.OWN_STRAIN_ENERGY else terms_kernel(size) if module.STRAIN_ENERGY else no_law()
+    kind = "closed" if method == "closed" else "reduced"
+    step = step_kernel(kind, size, module.PLAN, precision == "float32")
     if method == "closed":
-        return StepPointers(closed_step(), no_method(), no_law(), rest, plan, module.coefficients_, False)
+        return StepPointers(step, no_method(), no_law(), rest, plan, module.coefficients_, False)
     if method.endswith("affine"):
         plan[METHOD_START] = module.SIZE
-        return StepPointers(reduced_step(), affine_method(), no_law(), rest, plan, module.coefficients_, True)
+        return StepPointers(step, affine_method(), no_law(), rest, plan, module.coefficients_, True)
     chosen = single_method() if method.endswith("single") else projection_method()
-    return StepPointers(reduced_step(), chosen, module.functions_, rest, plan, module.coefficients_, False)
+    return StepPointers(step, chosen, module.functions_, rest, plan, module.coefficients_, False)

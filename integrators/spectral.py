@@ -12,29 +12,9 @@ import math
 from ..cache import njit
 from .key import kernels_hash
 
-__all__ = ["add_positive_derivative", "norm6", "positive_part"]
+__all__ = ["add_positive_derivative", "positive_part"]
 
 _FOLDER = kernels_hash()
-
-
-@njit(folder=_FOLDER, inline="never")
-def norm6(a):
-    """Euclidean norm of six components; the plain sum of squares unless it would leave the range of the exponent."""
-    total = a[0] * a[0] + a[1] * a[1] + a[2] * a[2] + a[3] * a[3] + a[4] * a[4] + a[5] * a[5]
-    if 1e-280 < total < 1e280:
-        return math.sqrt(total)
-    largest = 0.0
-    for i in range(6):
-        size = abs(a[i])
-        if not size <= largest:
-            largest = size
-    if largest == 0.0 or not largest < math.inf:
-        return largest
-    total = 0.0
-    for i in range(6):
-        part = a[i] / largest
-        total += part * part
-    return largest * math.sqrt(total)
 
 
 @njit(folder=_FOLDER)

@@ -19,11 +19,15 @@ from numpy.typing import NDArray
 from ..errors import ConvergenceError, DeclarationError, InputError, Status
 from ..potentials import Law
 from .declared import state_layout
+from .dimension import DIMENSIONS, Dimension, dimension_named
+from .kernels import step_text
 from .module_store import load_module
 from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
+from .relaxed import Evaluation, condensed, relax
 from .structure import NoReduction
-from .thermal import thermal_input, thermal_results
+from .thermal import ThermalData, thermal_input, thermal_results
+from .threads import checked_threads, shared
 
 __all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
 
@@ -37,10 +41,11 @@ EXPLICIT = "explicit"
 class StepResult:
     """Result of one step at n points.
 
-    `stress` [Pa] (n, 6) and `tangent` ∂σ/∂ε [Pa] (n, 6, 6) in Mandel components; `state` by name, tensors (n, 6), scalars (n,);
-    `dissipation` of the step [J/m³] (n,), mechanical; `status` (n,) of `Status` codes; `gap` [J/m³] (n,), primal minus dual, if certified.
-    `strain` [-] (n, 6) at the end of the step: the given one, or in the stress formulation the answer, with `tangent` ∂ε/∂σ [1/Pa].
-    Of a law with a temperature: `entropy` [J/(m³ K)] (n,), and `flux` −q/T [W/(m² K)] (n, 3) if φ* mentions the gradient of temperature.
+    `stress` [Pa] (n, m) and `tangent` ∂σ/∂ε [Pa] (n, m, m) in Mandel components, m = 6 or those of the dimension; `state` by name,
+    tensors (n, 6), scalars (n,); `dissipation` of the step [J/m³] (n,), mechanical; `status` (n,) of `Status` codes; `gap` [J/m³] (n,),
+    primal minus dual, if certified. `strain` [-] (n, 6) at the end of the step: the given one and what follows from a stress of zero, or in
+    the stress formulation the answer, with `tangent` ∂ε/∂σ [1/Pa]. Of a law with a temperature: `entropy` [J/(m³ K)] (n,), and `flux` −q/T
+    [W/(m² K)] (n, 3) if φ* mentions the gradient of temperature. Tensors of a state and strains have the components of `Dimension`.
     """
 
     stress: Array
@@ -65,6 +70,9 @@ class Update:
     layout: Mapping[str, tuple[int, int]] = field(default_factory=dict)
     state_size: int = 0
     why: str = ""
+    dimension: Dimension = DIMENSIONS["3d"]
+    precision: str = "float64"
+    threads: int = 1
 
     @cached_property
     def packing(self) -> StatePacking:
@@ -86,7 +94,13 @@ class Update:
     @cached_property
     def pointers(self) -> StepPointers:
         """The compiled step with the law's own functions."""
-        return step_pointers(self.module)
+        return step_pointers(self.module, self.precision)
+
+    @property
+    def step_source(self) -> str:
+        """Text of the emitted step: only the components and variables that exist stand in it."""
+        kind = "closed" if self.solver == "closed" else "reduced"
+        return step_text(kind, self.dimension.size, self.module.PLAN, self.precision == "float32")
 
     def __call__(
         self,
@@ -97,39 +111,89 @@ class Update:
         certify: bool = False,
         **values: Any,
     ) -> StepResult:
-        """Step to the strains `eps_new` [-], Mandel components, shape (n, 6) or (6,).
+        """Step to the strains `eps_new` [-], Mandel components, shape (n, 6) or (6,), or the given components of the dimension.
 
         `state` is an earlier `.state` or None; `dt` [s] matters to viscous laws only; `values` are the parameters by name. A law with a
         temperature takes it [K] under its name, a number or (n,), and its gradient [K/m], (3,) or (n, 3), under the name of the
         force that φ* gives it (zero if not given). Raises `InputError` for bad input and `ConvergenceError`, naming the first
         points, where the step fails.
         """
-        eps = strain_array(eps_new)
+        eps = self.dimension.strains(eps_new)
         n = eps.shape[0]
         heat, values = thermal_input(self.law, values, n)
         packed_parameters = packed_values(self, values)
         coefficients = self.pointers.coefficients(packed_parameters, step_time(dt), heat.temperature)
         old = self.pack(state, n)
-        new, stress = np.empty_like(old), np.empty((n, 6))
-        tangent = np.empty((n, 36)) if self.tangent else np.empty((1, 36))
-        dissipation, status = np.empty(n), np.empty(n, dtype=np.int64)
-        if n:
-            self.pointers.run(eps, old, new, stress, tangent, self.tangent, dissipation, status, coefficients)
+        if self.dimension.relaxed:
+            eps, (new, stress, tangent, dissipation, status) = self._relaxed(eps, old, coefficients)
+        else:
+            new, stress, tangent, dissipation, status = self.run(eps, old, coefficients, self.tangent)
         raise_failures(status, eps)
         gap = None
         if certify:
             from .certificate import duality_gap
 
             heated = heat.temperature if self.law.temperature is not None else None
-            gap = duality_gap(self, eps, old, new, packed_parameters, dt=dt, temperature=heated)
+            before, after = (self.packing.whole(packed, self.dimension) for packed in (old, new))
+            strain = self.dimension.embedded(eps)
+            gap = duality_gap(self, strain, before, after, packed_parameters, dt=dt, temperature=heated)
         found = self.unpack(new)
-        entropy, flux = thermal_results(self.law, heat, eps, found, values)
-        shaped = tangent.reshape(n, 6, 6) if self.tangent else None
+        entropy, flux = self._thermal(heat, eps, new, values)
+        shaped = tangent.reshape(n, *self._square) if tangent is not None else None
         return StepResult(stress, shaped, found, dissipation, status, gap, entropy, flux, eps)
 
+    def _thermal(self, heat: ThermalData, eps: Array, packed: Array, values: Mapping[str, Any]) -> Any:
+        if self.law.temperature is None:
+            return None, None
+        whole = StatePacking.of(self.law).unpack(self.packing.whole(packed, self.dimension))
+        return thermal_results(self.law, heat, self.dimension.embedded(eps), whole, values)
+
+    @property
+    def _square(self) -> tuple[int, int]:
+        size = len(self.dimension.given) if self.dimension.relaxed else self.dimension.size
+        return size, size
+
+    def run(self, eps: Array, old: Array, coefficients: Array, want: bool) -> tuple[Array, Array, Any, Array, Any]:
+        """(packed new state, stress, tangent in rows or None, dissipation, status) of packed rows; statuses are not looked at."""
+        n, size = eps.shape
+        kind = np.dtype(self.precision)
+        eps, old = eps.astype(kind, copy=False), old.astype(kind, copy=False)
+        new, stress = np.empty_like(old), np.empty((n, size), dtype=kind)
+        tangent = np.empty((n if want else 1, size * size), dtype=kind)
+        dissipation, status = np.empty(n, dtype=kind), np.empty(n, dtype=np.int64)
+
+        def part(start: int, stop: int) -> None:
+            rows = slice(start, stop)
+            self.pointers.run(
+                eps[rows], old[rows], new[rows], stress[rows], tangent[rows] if want else tangent, want, dissipation[rows],
+                status[rows], coefficients[rows] if len(coefficients) > 1 else coefficients,
+            )  # fmt: skip
+
+        if n:
+            shared(part, n, self.threads)
+        return new, stress, tangent if want else None, dissipation, status
+
+    def _relaxed(
+        self, eps: Array, old: Array, coefficients: Array
+    ) -> tuple[Array, tuple[Array, Array, Any, Array, Any]]:
+        """`run` at strains whose relaxed components make their stress zero; stress and tangent of the given components."""
+        size, given, relaxed = self.dimension.size, list(self.dimension.given), self.dimension.relaxed
+
+        def evaluate(strains: Array, points: Any) -> Evaluation:
+            rows = coefficients[points] if len(coefficients) > 1 else coefficients
+            new, stress, tangent, lost, status = self.run(strains, old[points], rows, True)
+            return Evaluation(stress, tangent.reshape(-1, size, size), status, (new, lost))
+
+        eps, found = relax(evaluate, eps, relaxed, rounding=float(np.finfo(self.precision).eps))
+        new, lost = found.rest
+        tangent = condensed(found.tangent, self.dimension.given, relaxed) if self.tangent else None
+        return eps, (new, found.stress[:, given], tangent, lost, found.status)
+
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
-        """Free energy ρψ [J/m³] at the given strains and internal variables, shape (n,)."""
-        strain = strain_array(eps)
+        """Free energy ρψ [J/m³] at strains (all components of the dimension) and internal variables, shape (n,)."""
+        strain = np.atleast_2d(np.asarray(eps, dtype=float))
+        if strain.shape[-1] != self.dimension.size:
+            strain = self.dimension.strains(eps)
         heat, values = thermal_input(self.law, values, strain.shape[0])
         packed = self.pack(state, strain.shape[0])
         return self.energies(strain, packed, heat.temperature, packed_values(self, values))
@@ -150,16 +214,7 @@ def step_time(dt: Any) -> float:
 
 def strain_array(eps: Any) -> Array:
     """Strains as a contiguous (n, 6) array; refuses other shapes and values that are not finite."""
-    try:
-        found = np.atleast_2d(np.asarray(eps, dtype=float))
-    except (TypeError, ValueError):
-        raise InputError("eps_new must be an array of numbers") from None
-    if found.ndim != 2 or found.shape[1] != 6:
-        raise InputError(f"eps_new has shape {np.shape(eps)}; it must be (n, 6) or (6,), Mandel components")
-    if not np.isfinite(found).all():
-        row = int(np.argmax(~np.isfinite(found).all(axis=1)))
-        raise InputError(f"eps_new holds a value that is not finite (point {row})")
-    return np.ascontiguousarray(found)
+    return DIMENSIONS["3d"].strains(eps)
 
 
 def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
@@ -186,35 +241,59 @@ def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
 
 
 def build_update(
-    law: Law, dimension: str = "3d", *, formulation: str = "strain", solver: str = "auto", tangent: bool = True
+    law: Law,
+    dimension: str = "3d",
+    *,
+    formulation: str = "strain",
+    solver: str = "auto",
+    tangent: bool = True,
+    precision: str = "float64",
+    threads: int = 1,
 ) -> Any:
     """Choose the cheapest exact method for the law: `closed`, else `reduced`, else `principal`, else `general` (any convex law); or take
-    the one that is named. `.solver` and `.why` of what is returned say which and why."""
-    if dimension != "3d":
-        raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
+    the one that is named. `.solver` and `.why` of what is returned say which and why.
+
+    `dimension` is one of `DIMENSIONS`; with `precision` "float32" the arrays of generated steps are in single precision, their arithmetic
+    stays double; `threads` share the points.
+    """
+    kinds = dimension_named(dimension)
     if formulation != "strain":
         raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
     if solver not in ("auto", *REDUCED, *GENERAL, EXPLICIT):
         raise InputError(
             f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL, EXPLICIT))}"
         )
+    if precision not in ("float64", "float32"):
+        raise InputError(f"precision {precision!r} is not known; it is float64 or float32")
+    checked_threads(threads)
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
-    if solver == EXPLICIT:
-        from .explicit import ExplicitUpdate
-
-        return ExplicitUpdate(law)
     why = "asked for by name"
     if solver == "auto" or solver in REDUCED:
         try:
-            module = load_module(law, solver)
-            layout, size = state_layout(law)
-            return Update(law, module, tangent, module.METHOD.split()[0], layout, size, module.WHY)
+            module = load_module(law, solver, kinds.size)
+            layout, size = state_layout(law, kinds.size)
+            method = module.METHOD.split()[0]
+            return Update(law, module, tangent, method, layout, size, module.WHY, kinds, precision, threads)
         except NoReduction as reason:
             if solver != "auto":
                 raise
             why = f"no cheaper method: {reason}"
-    from .general_update import GeneralUpdate
+    if precision != "float64":
+        raise InputError(
+            f"law '{law.name}': precision float32 is there for generated steps; the step of this law is 'general'"
+        )
+    if solver == EXPLICIT:
+        from .explicit import ExplicitUpdate
 
-    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why)
+        found: Any = ExplicitUpdate(law)
+    else:
+        from .general_update import GeneralUpdate
+
+        found = GeneralUpdate.of(law, tangent or bool(kinds.relaxed), "general" if solver == "auto" else solver, why)
+    if kinds.name == "3d":
+        return found
+    from .embedded import EmbeddedUpdate
+
+    return EmbeddedUpdate.of(found, kinds, tangent)

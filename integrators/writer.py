@@ -1,7 +1,7 @@
 """Write expressions and tensors of a law as statements of a generated module.
 
 Whatever depends on parameters alone is computed once per call (`constants_`) and reaches the point loop as `k0_, k1_, …`. Tensors
-are loops over six Mandel components. Names of the generator end with an underscore; names of the law stand as declared.
+are loops over their Mandel components. Names of the generator end with an underscore; names of the law stand as declared.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from ..potentials.derivative import invariants_of, is_constant
 from ..potentials.invariants import InnerLeaf, NormLeaf, PositiveSquareLeaf, TraceLeaf
 from ..potentials.printer import number_code
 from ..potentials.tensor import Deviator, IdentityTensor, PositiveTensor, SymmetricTensor, TensorSymbol
+from .kernels.terms_text import POSITIVE
 from .structure import NoReduction
 
 __all__ = ["Writer"]
@@ -26,6 +27,7 @@ class Writer:
     """Statements of one function; `constants` is shared by all functions of a module."""
 
     constants: dict[Expr, str]
+    size: int = 6
     indent: str = "    "
     lines: list[str] = field(default_factory=list)
     leaves: dict[Invariant, Symbol] = field(default_factory=dict)
@@ -88,7 +90,7 @@ class Writer:
         sphere = "" if spherical == 0 else self.code(spherical)
         text = _joined(parts)
         if parts or not add:
-            self.line("for i_ in range(6):")
+            self.line(f"for i_ in range({self.size}):")
             self.line(f"{target}[i_] {'+=' if add else '='} {text}", 1)
         if sphere:
             self.line(f"sphere_ = {sphere}")
@@ -117,16 +119,16 @@ class Writer:
         """Number of the eigen-decomposition of a tensor; computed by a statement at first use."""
         if tensor not in self.spectra:
             number = self.spectra[tensor] = len(self.spectra)
-            self.uses.add("positive_part")
-            self.line(f"positive{number}_ = work_[{4 * number + 2}, :6]")
+            self.uses.add(POSITIVE[self.size])
+            self.line(f"positive{number}_ = work_[{4 * number + 2}, :{self.size}]")
             self.line(f"eigen{number}_ = work_[{4 * number + 3}]")
             if isinstance(tensor, TensorSymbol):
                 source = tensor.name
             else:
                 source = f"argument{number}_"
-                self.line(f"{source} = work_[{4 * number + 4}, :6]")
+                self.line(f"{source} = work_[{4 * number + 4}, :{self.size}]")
                 self.tensor_into(source, tensor)
-            self.line(f"square{number}_ = positive_part({source}, eigen{number}_, positive{number}_)")
+            self.line(f"square{number}_ = {POSITIVE[self.size]}({source}, eigen{number}_, positive{number}_)")
         return self.spectra[tensor]
 
     def leaf(self, leaf: Invariant) -> Symbol:
@@ -144,10 +146,10 @@ class Writer:
             self.line(f"{symbol} = {text}")
             return symbol
         if isinstance(leaf, NormLeaf):
-            self.uses.add("norm6")
+            self.uses.add("norm_of")
             self.tensor_into("work_[0]", first)
             symbol = self.leaves.setdefault(leaf, Symbol(f"x{len(self.leaves)}_"))
-            self.line(f"{symbol} = norm6(work_[0])")
+            self.line(f"{symbol} = norm_of(work_[0], {self.size})")
             return symbol
         if not isinstance(leaf, InnerLeaf):
             raise NoReduction(f"no code is written for {leaf}")
@@ -160,7 +162,7 @@ class Writer:
             right = "work_[1]"
         symbol = self.leaves.setdefault(leaf, Symbol(f"x{len(self.leaves)}_"))
         self.line(f"{symbol} = 0.0")
-        self.line("for i_ in range(6):")
+        self.line(f"for i_ in range({self.size}):")
         self.line(f"{symbol} += work_[0][i_]*{right}[i_]", 1)
         return symbol
 

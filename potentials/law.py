@@ -250,6 +250,8 @@ class Law:
         formulation: str = "strain",
         solver: str = "auto",
         tangent: bool = True,
+        precision: str = "float64",
+        threads: int = 1,
         insist: bool = False,
     ) -> Any:
         """The implicit step as an `Update`; see `fenchel.integrators.build_update`.
@@ -262,7 +264,15 @@ class Law:
 
             refuse(self)
         law = replace(self, insist=True) if insist else self
-        return _integrators().build_update(law, dimension, formulation=formulation, solver=solver, tangent=tangent)
+        return _integrators().build_update(
+            law,
+            dimension,
+            formulation=formulation,
+            solver=solver,
+            tangent=tangent,
+            precision=precision,
+            threads=threads,
+        )
 
     def source(self, dimension: str = "3d") -> str:
         """Text of the generated module."""

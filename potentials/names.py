@@ -15,9 +15,9 @@ __all__ = ["RESERVED", "checked_name", "latex_name"]
 
 RESERVED = frozenset(
     """
-    abs add_positive_derivative bool certify complex control divmod dt e eps_new float float64 gap int len list math max min nan
-    njit norm6 np numba numpy pi positive_part pow print range round self sorted stack state status str sum tuple type update
-    values
+    abs add_positive_derivative add_positive_derivative_axes add_positive_derivative_plane bool certify complex control divmod dt
+    e eps_new float float64 gap int len list math max min nan njit norm6 norm_of np numba numpy pi positive_part
+    positive_part_axes positive_part_plane pow print range round self sorted stack state status str sum tuple type update values
     """.split()  # noqa: SIM905
 )
 _IDENTIFIER = re.compile(r"[A-Za-z][A-Za-z0-9_]*\Z")

@@ -2,14 +2,9 @@
 
 from __future__ import annotations
 
-import importlib.util
-import os
-import sys
-import tempfile
 from types import ModuleType
 
-from ...cache import cache_folder, content_hash
-from ...errors import StorageError
+from ...cache import content_hash, load_text
 
 __all__ = ["load", "name_of"]
 
@@ -38,28 +33,4 @@ def name_of(kind: str, text: str) -> str:
 
 def load(kind: str, text: str) -> ModuleType:
     """The module of a text, from memory, else from disk, else written now. Raises `StorageError` when the disk refuses."""
-    name = name_of(kind, text)
-    if name in sys.modules:
-        return sys.modules[name]
-    path = cache_folder() / "kernels" / f"{name}.py"
-    if not path.is_file():
-        try:
-            path.parent.mkdir(parents=True, exist_ok=True)
-            handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-            with os.fdopen(handle, "w", encoding="utf-8") as file:
-                file.write(_HEAD + text)
-            os.replace(temporary, path)
-        except OSError as error:
-            raise StorageError(
-                f"cannot write generated code to {path.parent}: {error.strerror}; set FENCHEL_CACHE to another folder"
-            ) from error
-    spec = importlib.util.spec_from_file_location(name, path)
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    sys.modules[name] = module
-    try:
-        spec.loader.exec_module(module)
-    except BaseException:
-        del sys.modules[name]
-        raise
-    return module
+    return load_text("kernels", name_of(kind, text), lambda: _HEAD + text)

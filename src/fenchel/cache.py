@@ -9,15 +9,20 @@ from __future__ import annotations
 
 import functools
 import hashlib
+import importlib.util
 import os
 import platform
 import sys
+import tempfile
 import threading
 from collections.abc import Callable
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 
-__all__ = ["cache_folder", "content_hash", "njit", "source_hash"]
+from .errors import StorageError
+
+__all__ = ["cache_folder", "content_hash", "load_text", "njit", "source_hash"]
 
 _decorating = threading.RLock()
 
@@ -40,6 +45,36 @@ def cache_folder() -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("fenchel"))
+
+
+def load_text(folder: str, name: str, text: Callable[[], str]) -> ModuleType:
+    """Module of generated code from memory, else from `folder` of the cache, else written there now; `name` must be a hash of all that made
+    it. Raises `StorageError` when the disk refuses."""
+    if name in sys.modules:
+        return sys.modules[name]
+    path = cache_folder() / folder / f"{name}.py"
+    if not path.is_file():
+        whole = text()
+        try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
+            with os.fdopen(handle, "w", encoding="utf-8") as file:
+                file.write(whole)
+            os.replace(temporary, path)
+        except OSError as error:
+            raise StorageError(
+                f"cannot write generated code to {path.parent}: {error.strerror}; set FENCHEL_CACHE to another folder"
+            ) from error
+    spec = importlib.util.spec_from_file_location(name, path)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    sys.modules[name] = module
+    try:
+        spec.loader.exec_module(module)
+    except BaseException:
+        del sys.modules[name]
+        raise
+    return module
 
 
 @functools.cache
