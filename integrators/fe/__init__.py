@@ -10,7 +10,7 @@ from .body import Body
 from .equilibrium import Equilibrium, solve, walk
 from .loads import Pressure, Support
 from .meshes import cylinder_section, read_mesh, rectangle, ring_section
-from .output import write_vtk
+from .output import quadrature_map, write_vtk
 
 __all__ = [
     "Body",
@@ -18,6 +18,7 @@ __all__ = [
     "Pressure",
     "Support",
     "cylinder_section",
+    "quadrature_map",
     "read_mesh",
     "rectangle",
     "ring_section",

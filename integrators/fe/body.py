@@ -4,7 +4,11 @@ The strain at all quadrature points is ε = B u (Mandel components), the interna
 
     "3d"            x, y, z ↦ 1, 2, 3
     "plane_strain"  x, y    ↦ 1, 2;  ε₃₃ = 0
+    "plane_stress"  x, y    ↦ 1, 2;  σ₃₃ = 0, by an update of that dimension; per unit thickness
     "axisymmetric"  x = r, y = z ↦ 1, 3;  the hoop strain u_r/r is ε₂₂;  weights hold 2π r
+
+An update compiled for three dimensions serves them all but plane stress; one compiled for the dimension of the body holds only the
+components that exist: (11, 22, 33, √2·12), (rr, zz, θθ, √2·rz) or (11, 22, √2·12).
 
 Selective integration replaces the volume strain by its mean over the element (Hughes 1980), which removes the locking of low-order elements
 under nearly isochoric or dilatant flow.
@@ -22,12 +26,13 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 
 from ...errors import InputError
+from ..dimension import DIMENSIONS as COMPILED
 
 __all__ = ["DIMENSIONS", "ELEMENTS", "Body"]
 
 Array = NDArray[np.float64]
 
-DIMENSIONS = ("3d", "plane_strain", "axisymmetric")
+DIMENSIONS = ("3d", "plane_strain", "axisymmetric", "plane_stress")
 # name: (mesh shape, element class of scikit-fem, quadrature order that integrates the linear elastic stiffness)
 ELEMENTS = {
     "Q1": ("quad", "ElementQuad1", 2),
@@ -77,8 +82,44 @@ class Body:
         object.__setattr__(self, "element", name)
         if self.integration not in ("full", "selective"):
             raise InputError(f"integration {self.integration!r} is not known; it is full or selective")
+        if self.compiled.name not in ("3d", self.dimension) or (self.dimension == "plane_stress" and not self.narrow):
+            raise InputError(
+                f"the update is compiled for '{self.compiled.name}', the body is '{self.dimension}': compile the law for that dimension"
+            )
+        if self.dimension == "plane_stress" and self.integration == "selective":
+            raise InputError(
+                "plane_stress: the volume strain is free there, selective integration has nothing to mend; use full"
+            )
         if self.dimension == "axisymmetric" and float(self.mesh.p[0].min()) < 0.0:
             raise InputError("axisymmetric: the first coordinate is the radius and must not be negative")
+
+    @property
+    def compiled(self) -> Any:
+        """Dimension that the update is compiled for; three dimensions where it does not say."""
+        return getattr(self.update, "dimension", COMPILED["3d"])
+
+    @property
+    def narrow(self) -> bool:
+        """True if strains and stresses have the components of the dimension only."""
+        return self.dimension != "3d" and self.compiled.name == self.dimension
+
+    @property
+    def components(self) -> int:
+        """Number of components of a strain that goes into the update."""
+        return len(self.compiled.given) if self.narrow else 6
+
+    def whole(self, field: Array) -> Array:
+        """Tensors (n, m) of the update or its state with six components, axes as in three dimensions; other fields as they are."""
+        if not self.narrow or field.ndim != 2:
+            return field
+        inside = (0, 2, 1, 4) if self.dimension == "axisymmetric" else (0, 1, 2, 5)
+        if field.shape[1] == 3 and self.components == 3:
+            inside = (0, 1, 5)
+        elif field.shape[1] != 4:
+            return field
+        found = np.zeros((field.shape[0], 6))
+        found[:, inside] = field
+        return found
 
     @cached_property
     def basis(self) -> Any:
@@ -112,7 +153,7 @@ class Body:
 
     @cached_property
     def strain_matrix(self) -> sp.csr_matrix:
-        """B: nodal displacements to the strains of all points, (6 point_count, dof_count)."""
+        """B: nodal displacements to the strains of all points, (components · point_count, dof_count)."""
         elements, per_element = self.basis.dx.shape
         count = self.point_count
         rows, columns, entries = [], [], []
@@ -123,14 +164,15 @@ class Body:
             if self.integration == "selective":
                 strain = self._with_mean_volume(strain)
             column = np.broadcast_to(dofs[:, None], (elements, per_element))
-            for k in range(6):
+            for k in range(self.components):
                 if strain[k] is None:
                     continue
-                rows.append((6 * place + k).reshape(-1))
+                rows.append((self.components * place + k).reshape(-1))
                 columns.append(column.reshape(-1))
                 entries.append(strain[k].reshape(-1))
         matrix = sp.coo_matrix(
-            (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))), shape=(6 * count, self.basis.N)
+            (np.concatenate(entries), (np.concatenate(rows), np.concatenate(columns))),
+            shape=(self.components * count, self.basis.N),
         ).tocsr()
         matrix.eliminate_zeros()
         return matrix
@@ -141,10 +183,15 @@ class Body:
             found: list[Any] = [grad[0, 0], grad[1, 1], grad[2, 2]]
             return [*found, *(_ROOT * (grad[i, j] + grad[j, i]) for i, j in ((1, 2), (0, 2), (0, 1)))]
         shear = _ROOT * (grad[0, 1] + grad[1, 0])
+        if self.dimension == "plane_stress":
+            return [grad[0, 0], grad[1, 1], shear]
         if self.dimension == "plane_strain":
-            return [grad[0, 0], grad[1, 1], None, None, None, shear]
-        radius = self.points[:, 0].reshape(self.basis.dx.shape)
-        return [grad[0, 0], value[0] / radius, grad[1, 1], None, shear, None]
+            found = [grad[0, 0], grad[1, 1], None, shear]
+            return found if self.narrow else [*found[:3], None, None, shear]
+        hoop = value[0] / self.points[:, 0].reshape(self.basis.dx.shape)
+        if self.narrow:
+            return [grad[0, 0], grad[1, 1], hoop, shear]
+        return [grad[0, 0], hoop, grad[1, 1], None, shear, None]
 
     def _with_mean_volume(self, strain: list[Any]) -> list[Any]:
         weights = self.weights.reshape(self.basis.dx.shape)
@@ -154,8 +201,8 @@ class Body:
         return [(change if s is None else s + change) for s in strain[:3]] + strain[3:]
 
     def strain(self, displacement: Array) -> Array:
-        """Strains [-] at the quadrature points, (point_count, 6)."""
-        return (self.strain_matrix @ displacement).reshape(-1, 6)
+        """Strains [-] at the quadrature points, (point_count, components)."""
+        return (self.strain_matrix @ displacement).reshape(-1, self.components)
 
     def internal_force(self, stress: Array) -> Array:
         """∫ σ:ε(v) for every basis function [N; N/m in plane strain], (dof_count,)."""
@@ -165,7 +212,8 @@ class Body:
         """∫ ε(v):C:ε(u) [N/m], sparse."""
         blocks = self.weights[:, None, None] * tangent
         count = self.point_count
-        middle = sp.bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=(6 * count, 6 * count))
+        size = self.components * count
+        middle = sp.bsr_matrix((blocks, np.arange(count), np.arange(count + 1)), shape=(size, size))
         return (self.strain_matrix.T @ (middle @ self.strain_matrix)).tocsc()
 
     def average(self, field: Array) -> Array:

@@ -34,8 +34,9 @@ class Equilibrium:
     """A converged state at `time` [s].
 
     `displacement` and `force` (internal, so that on supports it is the reaction) by degree of freedom [m], [N] (per unit thickness in plane
-    strain); `strain` [-], `stress` [Pa] (point_count, 6), `tangent` [Pa] (point_count, 6, 6) at the quadrature points, `state` by name,
-    `dissipation` accumulated [J/m³]; `residual` relative, `iterations` of the step, `residuals` of its last Newton loop.
+    strain and stress); at the quadrature points `strain` [-], `stress` [Pa] (point_count, m), `tangent` [Pa] (point_count, m, m), m = 6 or
+    `body.components`, `state` by name, `dissipation` accumulated [J/m³]; `residual` relative, `iterations` of the step, `residuals` of its
+    last Newton loop.
     """
 
     time: float
@@ -54,13 +55,13 @@ class Equilibrium:
     def virgin(cls, body: Body, time: float = 0.0) -> Equilibrium:
         """The body at rest, without strain."""
         state = body.update.initial_state(body.point_count)
-        out = body.update(np.zeros((body.point_count, 6)), state, **body.values)
+        out = body.update(np.zeros((body.point_count, body.components)), state, **body.values)
         zero = np.zeros(body.basis.N)
         return cls(
             time,
             zero,
             body.internal_force(out.stress),
-            np.zeros((body.point_count, 6)),
+            np.zeros((body.point_count, body.components)),
             out.stress,
             out.tangent,
             state,
@@ -245,7 +246,9 @@ class _Task:
         """Force that rounding of strain times stiffness makes."""
         stiff = np.abs(out.tangent).max(axis=(1, 2)) * np.abs(self.body.strain(displacement)).max(axis=1)
         return 1e-15 * float(
-            np.linalg.norm(np.abs(self.body.strain_matrix).T @ np.repeat(self.body.weights * stiff, 6))
+            np.linalg.norm(
+                np.abs(self.body.strain_matrix).T @ np.repeat(self.body.weights * stiff, self.body.components)
+            )
         )
 
     def _solved(self, stiffness: Any, right: Array) -> Array:

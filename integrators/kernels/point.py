@@ -51,9 +51,13 @@ def size_of(axes):
 
 
 @njit(folder=_FOLDER)
-def theta(a, b, left, right, p_aa, p_bb, p_ab, size):
-    """(e_a − e_b)/(a − b); its limit ½(P_aa + P_bb) − P_ab where the values coincide."""
+def theta(a, b, left, right, p_aa, p_bb, p_ab, size, most):
+    """(e_a − e_b)/(a − b); its limit ½(P_aa + P_bb) − P_ab where the values coincide.
+
+    A projection turns no further than its trial: what rounding over a small gap makes beyond 0 … `most` is cut off.
+    """
     gap = a - b
     if abs(gap) > 1e-9 * size:
-        return (left - right) / gap
+        found = (left - right) / gap
+        return min(max(found, 0.0), most) if most < math.inf else found
     return 0.5 * (p_aa + p_bb) - p_ab

@@ -102,7 +102,9 @@ class _Text:
         if self.principal:
             self._principal_trial(depth)
         elif self.norm:
-            add(depth, "mean = (b0 + b1 + b2) / 3.0", "b0, b1, b2 = b0 - mean, b1 - mean, b2 - mean")
+            # twice: what rounding of a large mean leaves is no part of a small deviator
+            for _ in range(2):
+                add(depth, "mean = (b0 + b1 + b2) * THIRD", "b0, b1, b2 = b0 - mean, b1 - mean, b2 - mean")
             add(depth, "b = blocks[i]", f"{', '.join(f'b[{i}]' for i in n)} = {', '.join(f'b{i}' for i in n)}")
             add(depth, f"q = {' + '.join(f'b{i} * b{i}' for i in n)}")
             add(depth, f"trial[i, 0] = math.sqrt(q) if 1e-280 < q < 1e280 else norm_of(b, {self.size})")
@@ -265,6 +267,9 @@ class _Text:
         pairs = [p for p in PAIRS if self._mixed(*p)]
         names = {(k, l): f"p{min(k, l)}{max(k, l)}" for k in range(3) for l in range(3)}
         add(depth, "g_0, g_1 = c[3], c[4]")
+        if pairs:
+            metric = self.plan[METRIC]
+            add(depth, f"own = c[{metric}] - c[{metric + 1}]", "most = 1.0 / own if own > 0.0 else math.inf")
         for k in range(3):
             add(depth, *(f"p{k}{l} = f[{first + count * k + l}]" for l in range(k, 3)))
         add(depth, *(f"z{k} = {' + '.join(names[k, l] for l in range(3))}" for k in range(3)))
@@ -272,7 +277,7 @@ class _Text:
         for k, l in pairs:
             add(
                 depth,
-                f"q{k}{l} = theta(a[{k}], a[{l}], f{k}, f{l}, {names[k, k]}, {names[l, l]}, {names[k, l]}, size_of(a))",
+                f"q{k}{l} = theta(a[{k}], a[{l}], f{k}, f{l}, {names[k, k]}, {names[l, l]}, {names[k, l]}, size_of(a), most)",
             )
         for k in range(3):
             add(depth, *(f"{names[k, l]} = g_0 * {names[k, l]} + w * (z{k} + z{l}) + total" for l in range(k, 3)))

@@ -16,6 +16,7 @@ from fenchel.integrators.fe import (
     Equilibrium,
     Pressure,
     Support,
+    quadrature_map,
     read_mesh,
     rectangle,
     ring_section,
@@ -24,7 +25,7 @@ from fenchel.integrators.fe import (
     write_vtk,
 )
 from fenchel.integrators.fe.meshes import cylinder_section
-from fenchel.potentials.library import linear_elastic, sand, von_mises
+from fenchel.potentials.library import linear_elastic, sand, texsol, tresca, von_mises
 
 ELASTIC = dict(E=210.0, nu=0.3)
 PLASTIC = dict(E=1.0, nu=0.3, H_k=0.0, H_i=0.0, sigma_y=1e-3)
@@ -133,6 +134,61 @@ def test_hollow_sphere_half_plastic(metal, element, curved, order, bound):
         errors.append(abs(found / ((1 - 0.3) * Y * c**3 / b**2) - 1))
     assert errors[-1] < bound
     assert rates(errors)[-1] > order - 0.3, rates(errors)
+
+
+@pytest.mark.parametrize(("element", "curved", "order", "bound"), [("Q1", False, 2.0, 1e-2), ("Q2", True, 3.7, 3e-4)])
+def test_tube_of_a_tresca_metal_half_plastic(element, curved, order, bound):
+    """Hill 1950, ch. V: p = Y/2 (1 − c²/b²) + Y ln(c/a), u_b = (1 − ν²) Y c²/(E b) in plane strain, σ_z between the others."""
+    a, b, c, Y = 1.0, 2.0, 1.5, 1e-3
+    pressure = 0.5 * Y * (1 - c**2 / b**2) + Y * np.log(c / a)
+    update, errors = tresca.compile("plane_strain"), []
+    for n in (4, 8, 16) if element == "Q1" else (2, 4, 8):
+        values = dict(E=1.0, nu=0.3, sigma_y=Y, H_i=0.0)
+        body = Body(ring_section(a, b, n, n, curved=curved), update, values, "plane_strain", element)
+        supports = [Support("start", y=0.0), Support("end", x=0.0)]
+        state = solve(body, np.linspace(0, 1, 6), supports, [Pressure("inside", lambda t: pressure * t)])[-1]
+        found = np.abs(state.displacement[body.basis.get_dofs("outside").all(["u^1"])]).max()
+        errors.append(abs(found / ((1 - 0.3**2) * Y * c**2 / b) - 1))
+    radius, share = np.linalg.norm(body.points, axis=1), state.dissipation > 0.0
+    assert radius[share].max() < c + 0.15 and radius[~share].min() > c - 0.15
+    assert errors[-1] < bound
+    assert rates(errors)[-1] > order - 0.3, (rates(errors), errors)
+
+
+@pytest.mark.parametrize("dimension", ["plane_strain", "axisymmetric"])
+def test_a_body_with_the_components_of_its_dimension_moves_the_same(dimension):
+    wire = dict(lambda_w=1e6, mu_w=2e6)
+    found = []
+    for kind in ("3d", dimension):
+        mesh = cylinder_section(0.5, 1.0, 5, 5)
+        body = Body(mesh, texsol.compile(kind), SAND | wire, dimension, "Q1", "selective")
+        state = solve(body, [0.0, 0.5, 1.0], ROUGH)[-1]
+        found.append(
+            (body, state, [quadrature_map(body, state, n)[1] for n in ("stress_zz", "eps_p_xx", "sqrt_J2", "p")])
+        )
+    (whole, one, maps), (narrow, two, others) = found
+    assert (whole.components, narrow.components) == (6, 4)
+    assert np.abs(one.displacement - two.displacement).max() < 1e-12
+    for left, right in zip(maps, others, strict=True):
+        assert np.abs(left).max() > 0 and right == pytest.approx(left, abs=1e-9 * np.abs(left).max())
+
+
+def test_a_plate_in_plane_stress():
+    """Uniform tension: elastic contraction −ν ε, then the yield stress of a perfectly plastic metal."""
+    sides = [Support("left", x=0.0), Support("bottom", y=0.0), Support("right", x=lambda t: 2e-3 * t)]
+    body = Body(rectangle(1.0, 0.5, 3, 2), von_mises.compile("plane_stress"), PLASTIC, "plane_stress", "Q2")
+    state = solve(body, np.linspace(0, 1, 5), sides)[-1]
+    assert state.stress == pytest.approx(np.tile([1e-3, 0.0, 0.0], (body.point_count, 1)), abs=1e-9)
+    half = solve(body, [0.0, 0.25, 0.4], sides)[0]
+    assert half.strain[:, 1] == pytest.approx(-0.3 * half.strain[:, 0], rel=1e-9)
+    points, stress = quadrature_map(body, state, "stress_xx")
+    assert points.shape == (body.point_count, 2) and stress == pytest.approx(1e-3)
+    with pytest.raises(InputError, match="there are: strain_xx"):
+        quadrature_map(body, state, "heat")
+    with pytest.raises(InputError, match="compile the law for that dimension"):
+        Body(rectangle(1.0, 0.5, 3, 2), von_mises.compile("3d"), PLASTIC, "plane_stress")
+    with pytest.raises(InputError, match="compile the law for that dimension"):
+        Body(rectangle(1.0, 0.5, 3, 2), von_mises.compile("plane_stress"), PLASTIC, "plane_strain")
 
 
 def footing(metal, n, steps, depth=0.05):
