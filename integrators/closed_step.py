@@ -68,6 +68,10 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
         # the deviator is removed numerically from the sum, so that its trace vanishes to rounding
         mean = (b0 + b1 + b2) * third
         b0, b1, b2 = b0 - mean, b1 - mean, b2 - mean
+        if terms < 0:
+            # driven by the stress the deviator of a nearly spherical one is a direction: its trace vanishes beside itself
+            mean = (b0 + b1 + b2) * third
+            b0, b1, b2 = b0 - mean, b1 - mean, b2 - mean
         q = b0 * b0 + b1 * b1 + b2 * b2 + b3 * b3 + b4 * b4 + b5 * b5
         if 1e-280 < q < 1e280:
             q = math.sqrt(q)

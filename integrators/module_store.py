@@ -30,15 +30,15 @@ def module_source(law: Law, dimension: str = "3d") -> str:
         return declared_module(law, str(reason))
 
 
-def load_module(law: Law, solver: str = "auto") -> ModuleType:
+def load_module(law: Law, solver: str = "auto", formulation: str = "strain") -> ModuleType:
     """Generated module of the law, from memory, else from disk, else written now. The key is formed before any differentiation."""
-    key = content_hash(law.text, solver, rooms_hash())
+    key = content_hash(law.text, solver, formulation, rooms_hash())
     name = f"fenchel_law_{law.name}_{key}"
     if name in sys.modules:
         return sys.modules[name]
     path = cache_folder() / "laws" / f"{name}.py"
     if not path.is_file():
-        _write(path, closed_module(law, solver))
+        _write(path, closed_module(law, solver, formulation))
     spec = importlib.util.spec_from_file_location(name, path)
     assert spec is not None and spec.loader is not None
     module = importlib.util.module_from_spec(spec)

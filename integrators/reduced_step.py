@@ -71,9 +71,11 @@ def _trial(e, x, c, plan, b, axes, trial):
         sphere += c[o + 1] * (x[p] + x[p + 1] + x[p + 2])
     if plan[KIND] == 0:
         if plan[NORM] > 0:
-            mean = (b[0] + b[1] + b[2]) / 3.0
-            for i in range(3):
-                b[i] -= mean
+            # driven by the stress the deviator of a nearly spherical one is a direction: its trace vanishes beside itself
+            for _ in range(2 if plan[STRAIN] < 0 else 1):
+                mean = (b[0] + b[1] + b[2]) / 3.0
+                for i in range(3):
+                    b[i] -= mean
             trial[0] = norm6(b)
         for i in range(traces):
             o = plan[TRACE_START] + (2 + 2 * tensors) * i

@@ -192,8 +192,8 @@ def build_update(
     the one that is named. `.solver` and `.why` of what is returned say which and why."""
     if dimension != "3d":
         raise InputError(f"dimension {dimension!r} is not available; it is '3d'")
-    if formulation != "strain":
-        raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
+    if formulation not in ("strain", "stress"):
+        raise InputError(f"formulation {formulation!r} is not known; it is 'strain' or 'stress'")
     if solver not in ("auto", *REDUCED, *GENERAL, EXPLICIT):
         raise InputError(
             f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL, EXPLICIT))}"
@@ -201,6 +201,10 @@ def build_update(
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
+    if formulation == "stress":
+        from .stress_update import build_stress_update
+
+        return build_stress_update(law, solver, tangent)
     if solver == EXPLICIT:
         from .explicit import ExplicitUpdate
 
