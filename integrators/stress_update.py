@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..potentials import Law
 from .declared import state_layout
+from .inverse_step import InversePointers, inverse_pointers
 from .module_store import load_module
 from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
@@ -70,19 +71,17 @@ class StressUpdate:
         return self.packing.pack(state, point_count)
 
     @cached_property
-    def pointers(self) -> StepPointers:
+    def pointers(self) -> StepPointers | InversePointers:
         """The compiled step with the law's own functions."""
         found = step_pointers(self.module)
         if not self.inverse:
             return found
-        from .inverse_step import inverse_pointers
-
         return inverse_pointers(found, self.module)
 
     @property
     def compiled_path(self) -> bool:
         """True if the compiled path loop can call this step."""
-        return not self.inverse or self.pointers.step is not step_pointers(self.module).step
+        return isinstance(self.pointers, StepPointers)
 
     def __call__(
         self,
