@@ -108,7 +108,9 @@ def _module(
         + " (`fenchel.integrators.reduced_step`), q_ = |dev B|, t_ traces",
         "principal": "projection in the principal values of B and scalar forces (`fenchel.integrators.reduced_step`)",
     }[method]
-    driven = [] if formulation == "strain" else ["Driven by the stress: the numbers of the step are those of −psi*.", ""]
+    driven = (
+        [] if formulation == "strain" else ["Driven by the stress: the numbers of the step are those of −psi*.", ""]
+    )
     text = [
         f'"""Implicit step of the law `{law.name}`, written by fenchel: {described}.',
         "",

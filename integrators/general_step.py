@@ -170,7 +170,8 @@ class GeneralStep:
         tolerance: float = TOLERANCE,
         start: StepSolution | None = None,
     ) -> StepSolution:
-        """The step at every point, (n, 6) strains (or stresses), (n, …) packed old states; `method` "general", or "conic" to polish clarabel's answer.
+        """The step at every point, (n, 6) strains (or stresses), (n, …) packed old states; `method` "general", or "conic" to polish
+        clarabel's answer.
 
         `start`, an earlier solution at the same number of points and groups, warms the engine.
         """

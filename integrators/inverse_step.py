@@ -95,7 +95,9 @@ def advance(sig, rows, tangent, status, stiff, room, control):
     if control[COUNT] > LIMIT:
         return 3 if stiff * size > 1e9 * load else 1
     fine = status == 0 and now < math.inf
-    if not (before < 0.0 or (fine and (now < 0.5 * before or abs(along) <= 0.9 * abs(slope) or (along < 0.0 and up < 0.0)))):
+    if not (
+        before < 0.0 or (fine and (now < 0.5 * before or abs(along) <= 0.9 * abs(slope) or (along < 0.0 and up < 0.0)))
+    ):
         # the slope is monotone along the direction: bracket its zero
         control[CUT] += 1.0
         control[LOW if fine and along < 0.0 else UP] = control[LENGTH]

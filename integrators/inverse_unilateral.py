@@ -260,7 +260,11 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
         if not done:
             begin(rows, control)
             flag = -1
-            before, after, row = old[point : point + 1], new[point : point + 1], coefficients[step * point : step * point + 1]
+            before, after, row = (
+                old[point : point + 1],
+                new[point : point + 1],
+                coefficients[step * point : step * point + 1],
+            )
             while flag < 0 or (flag == 0 and control[0] < math.inf):
                 if flag == 0:
                     control[0] = math.inf  # once more at the best point, for its state and tangent
@@ -286,14 +290,22 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
         j3, j4, j5 = n1 * y2 + n2 * y1, n0 * y2 + n2 * y0, n0 * y1 + n1 * y0
         p0, p1, p2, p3, p4, p5 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         if stage == 1:
-            s, t, u = wi * ib, wj * jb, nb - beta * g_i
+            s, t = wi * ib, wj * jb
             p0, p1, p2 = c * b0 + s * i0 + t * j0, c * b1 + s * i1 + t * j1, c * b2 + s * i2 + t * j2
             p3, p4, p5 = c * b3 + s * i3 + t * j3, c * b4 + s * i4 + t * j4, c * b5 + s * i5 + t * j5
             # w (n:B) n − β (v:B)/D v with v = c I + w n
             s = w * nb
-            p0, p1, p2 = p0 + s * n0 * n0 - beta * g_i * v0, p1 + s * n1 * n1 - beta * g_i * v1, p2 + s * n2 * n2 - beta * g_i * v2
+            p0, p1, p2 = (
+                p0 + s * n0 * n0 - beta * g_i * v0,
+                p1 + s * n1 * n1 - beta * g_i * v1,
+                p2 + s * n2 * n2 - beta * g_i * v2,
+            )
             s *= _ROOT
-            p3, p4, p5 = p3 + s * n1 * n2 - beta * g_i * v3, p4 + s * n0 * n2 - beta * g_i * v4, p5 + s * n0 * n1 - beta * g_i * v5
+            p3, p4, p5 = (
+                p3 + s * n1 * n2 - beta * g_i * v3,
+                p4 + s * n0 * n2 - beta * g_i * v4,
+                p5 + s * n0 * n1 - beta * g_i * v5,
+            )
             s, t = g_q * d_slip, g_t * d_gamma / D
             e_0, e_1, e_2 = e_0 + (s * p0 + t * v0), e_1 + (s * p1 + t * v1), e_2 + (s * p2 + t * v2)
             e_3, e_4, e_5 = e_3 + (s * p3 + t * v3), e_4 + (s * p4 + t * v4), e_5 + (s * p5 + t * v5)
@@ -328,7 +340,11 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
         z_vv, z_vp, z_pp = beta / D, 0.0, 0.0
         if stage == 1:
             inverse = 1.0 / q
-            k_bb, k_bi, k_ii = g_q * g_q * (slip - a * a / h) * inverse * inverse, -g_q * g_t * a / h * inverse, -g_t * g_t / h
+            k_bb, k_bi, k_ii = (
+                g_q * g_q * (slip - a * a / h) * inverse * inverse,
+                -g_q * g_t * a / h * inverse,
+                -g_t * g_t / h,
+            )
             g_11, g_12 = 1.0 + g_b * k_bb + g_i * k_bi, g_b * k_bi + g_i * k_ii
             g_21, g_22 = g_i * k_bb + g_ii * k_bi, 1.0 + g_i * k_bi + g_ii * k_ii
             det = 1.0 / (g_11 * g_22 - g_12 * g_21)
