@@ -6,6 +6,7 @@ from .driver import drive
 from .history import History, drive_arrays
 from .module_store import module_source
 from .path_file import StrainStressPath, read_path, write_history
+from .stress_update import StressUpdate
 from .update import StepResult, Update, build_update
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "History",
     "StepResult",
     "StrainStressPath",
+    "StressUpdate",
     "Update",
     "build_update",
     "conic_step",

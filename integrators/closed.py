@@ -7,13 +7,16 @@ functions_, rest_              scalar functions of a curved or viscous step, an 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from sympy import Expr, S
 
 from ..potentials import Law
 from ..potentials.printer import number_code
 from .coefficients import Numbers, closed_numbers, is_closed, is_single, reduced_numbers, strain_numbers
+from .conjugate_moduli import conjugate_moduli
 from .declared import state_layout
-from .plan import STRAIN_START
+from .plan import STRAIN, STRAIN_START
 from .reduced_structure import Reduction, find_reduction
 from .reduced_text import RATE_TIME, function_text
 from .rest_text import rest_text
@@ -23,6 +26,9 @@ from .writer import Writer
 __all__ = ["closed_module"]
 
 _SHORT = {6: "", 4: " 11, 22, 33, 12", 3: " 11, 22, 33"}
+CLOSED_STRAIN = 2
+"""Place in the plan of a closed step that says whether there are energies of the strain, or that the step is driven by the stress."""
+
 WHY = {
     "closed": "one surface, affine in one deviator norm, traces and scalar forces: the step is in closed form",
     "reduced": "tensor forces enter through one deviator norm and traces: the step is a projection of a few numbers",
@@ -30,16 +36,22 @@ WHY = {
 }
 
 
-def closed_module(law: Law, solver: str = "auto", size: int = 6) -> str:
-    """Text of the generated module for tensors of `size` components; `NoReduction` says why a law has no step of that kind."""
+def closed_module(law: Law, solver: str = "auto", size: int = 6, formulation: str = "strain") -> str:
+    """Text of the generated module for tensors of `size` components; `NoReduction` says why a law has no step of that kind.
+
+    With `formulation="stress"` the numbers are those of −ψ*, and the step takes stresses: see `conjugate_moduli`.
+    """
     reduction = find_reduction(law)
     _check_kind(reduction, solver)
+    if formulation == "stress":
+        reduction = replace(reduction, moduli=conjugate_moduli(reduction.moduli, law.name))
     functions: list[str] = []
     own: list[Expr] = []
     if is_closed(reduction) and solver in ("auto", "closed"):
         numbers, method = closed_numbers(reduction, size), "closed"
+        turned = CLOSED_STRAIN
     else:
-        numbers = reduced_numbers(reduction, size)
+        numbers, turned = reduced_numbers(reduction, size), STRAIN
         method = "principal" if reduction.kind == "principal" else "reduced"
         if reduction.affine:
             _affine(numbers, reduction)
@@ -47,11 +59,13 @@ def closed_module(law: Law, solver: str = "auto", size: int = 6) -> str:
             functions, own = function_text(reduction, numbers.size)
             numbers.add("constants of functions_", *own)
         numbers.plan[STRAIN_START] = strain_numbers(numbers, reduction)
+    if formulation == "stress":
+        numbers.plan[turned] = -1
     if reduction.moduli.rest != 0:
         rest, constants = rest_text(law, reduction.moduli.rest, size)
         functions = functions + rest
         numbers.add("constants of rest_", *constants)
-    return _module(law, reduction, numbers, method, functions, size)
+    return _module(law, reduction, numbers, method, functions, size, formulation)
 
 
 def _check_kind(reduction: Reduction, solver: str) -> None:
@@ -80,7 +94,9 @@ def _affine(numbers: Numbers, reduction: Reduction) -> None:
         numbers.add(f"surface {i}: normal, value at zero", *(f.diff(z) for z in reduction.unknowns), rest)
 
 
-def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, functions: list[str], size: int) -> str:
+def _module(
+    law: Law, reduction: Reduction, numbers: Numbers, method: str, functions: list[str], size: int, formulation: str
+) -> str:
     _, width = state_layout(law, size)
     energy, spectral = _energy(law, size)
     source = "spectral" if size == 6 else "spectral_plane"
@@ -97,9 +113,13 @@ def _module(law: Law, reduction: Reduction, numbers: Numbers, method: str, funct
         + " (`fenchel.integrators.kernels.reduced_text`), q_ = |dev B|, t_ traces",
         "principal": "projection in the principal values of B and scalar forces (`fenchel.integrators.kernels.reduced_text`)",
     }[method]
+    driven = (
+        [] if formulation == "strain" else ["Driven by the stress: the numbers of the step are those of −psi*.", ""]
+    )
     text = [
         f'"""Implicit step of the law `{law.name}`, written by fenchel: {described}.',
         "",
+        *driven,
         f"Strain [-] and stress [Pa] in Mandel components{_SHORT[size]}.",
         "",
         *law.text.splitlines(),

@@ -142,7 +142,9 @@ def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array
 
     d, n = data[0], program.p.size
     rest = d.copy()
-    rest[:6] = 0.0
+    # the minimum is convex in a given strain, which can be an unknown; it is concave in a given stress, which is a number
+    shown = 0.0 if program.stress else 1.0
+    rest[:6] *= 1.0 - shown
     q, h = program.q0 + program.q1 @ d, program.h0 + program.h1 @ d
     stiffness = float(np.diag(program.C)[:6].max(initial=0.0)) or 1.0
     size = max(
@@ -154,23 +156,25 @@ def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array
     y = cp.Variable(n) if n else None
     point = cp.hstack([e, y]) if y is not None else e
     scale = np.concatenate([np.full(6, strain_unit), np.ones(n)])
-    M = np.block([[program.C[:6, :6], program.q1[:, :6].T], [program.q1[:, :6], np.diag(program.p)]])
+    cross = shown * program.q1[:, :6]
+    M = np.block([[shown * program.C[:6, :6], cross.T], [cross, np.diag(program.p)]])
     values, vectors = np.linalg.eigh(scale[:, None] * M * scale[None, :])
     keep = values > 1e-14 * max(float(values.max(initial=0.0)), 1e-300)
     factor = np.sqrt(values[keep])[:, None] * vectors[:, keep].T
-    slope = np.concatenate([program.c1[:6] + program.C[:6] @ rest, program.q0 + program.q1 @ rest]) * scale / size
+    slope = np.concatenate([shown * (program.c1[:6] + program.C[:6] @ rest), program.q0 + program.q1 @ rest])
+    slope *= scale / size
     objective = 0.5 * cp.sum_squares(factor @ point) + slope @ point
     shift = (program.h0 + program.h1 @ rest) / size
-    strains = program.h1[:, :6] * strain_unit
+    strains = shown * program.h1[:, :6] * strain_unit
     slack = shift + strains @ e - (program.G @ y if y is not None else 0.0) if shift.size else None
     cones, constraints = [], []
     start = 0
     for cone in program.cones:
-        constraint, shown = _constraint(cp, cone, slack[start : start + cone.size])  # type: ignore[index]
+        constraint, kept = _constraint(cp, cone, slack[start : start + cone.size])  # type: ignore[index]
         start += cone.size
-        cones.append(shown)
+        cones.append(kept)
         constraints.append(constraint)
-    fixed = e == eps[0] / (strain_unit * size)
+    fixed = e == shown * eps[0] / (strain_unit * size)
     problem = cp.Problem(cp.Minimize(objective), [fixed, *constraints])
     return ConicStep(law, update, program, data, eps, old, problem, fixed, y, tuple(cones), size, strain_unit)
 
@@ -228,6 +232,7 @@ def reference(step: GeneralStep, eps: Array, old: Array, temperature: Array | No
                 status[i] = Status.INFEASIBLE if "infeasible" in said else Status.ITERATION_LIMIT
                 continue
             slopes[i] = slopes_of(program, data[row : row + 1], y[None], multipliers[None])[0, : slopes.shape[1]]
-            slopes[i, :6] = -given.strain_constraint.dual_value * given.size / given.strain_unit
+            if not step.stress:
+                slopes[i, :6] = -given.strain_constraint.dual_value * given.size / given.strain_unit
             increment[i] = program.increments(data[row : row + 1], y[None])[0]
     return StepSolution(slopes, None, increment, residual, status, np.zeros(n, dtype=np.int64), [])

@@ -13,25 +13,29 @@ from ..potentials import Law
 from .general_update import GeneralUpdate
 from .history import History, drive_arrays
 from .path_file import StrainStressPath, read_path
+from .stress_update import StressUpdate
 from .update import Update, build_update
 
 __all__ = ["drive"]
 
 
 def drive(
-    law: Law | Update | GeneralUpdate,
+    law: Law | Update | GeneralUpdate | StressUpdate,
     path: StrainStressPath | str | Path,
     values: Mapping[str, Any],
     initial_state: Mapping[str, Any] | None = None,
     *,
     solver: str = "auto",
+    formulation: str = "strain",
 ) -> History:
-    """Follow `path` (a file or what `read_path` returns) with the parameter values by name.
+    """Follow `path` (a file or what `read_path` returns) with the parameter values by name; `solver` and `formulation` are for a law
+    that is not compiled yet.
 
     Raises `InputError` for bad input, `ConvergenceError` with the row where the path cannot be followed.
     """
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
-    update = law if isinstance(law, (Update, GeneralUpdate)) else build_update(law, solver=solver)
+    compiled = isinstance(law, (Update, GeneralUpdate, StressUpdate))
+    update = law if compiled else build_update(law, solver=solver, formulation=formulation)
     return drive_arrays(
         update,
         plan.control,

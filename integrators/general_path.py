@@ -1,14 +1,21 @@
-"""Paths of a law stepped by cone programs: the same mixed control as for compiled laws, one point, exact tangents, warm starts."""
+"""Paths of a law that the compiled path loop cannot call: the same mixed control, one point, exact tangents, warm starts.
+
+Stepped by cone programs in either formulation, or by the inverse of a generated step.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .general_step import StepSolution
 from .general_update import GeneralUpdate
+from .stress_update import StressUpdate
+from .thermal import thermal_input
 
 __all__ = ["follow"]
 
@@ -18,8 +25,63 @@ FLOOR = 1e-9
 TURNS = 60
 
 
+@dataclass(frozen=True)
+class _Answer:
+    """What a step gives at one point: the stress of a strain or the strain of a stress, its derivative, status, state, dissipation."""
+
+    answer: Array
+    tangent: Array
+    status: int
+    state: Array
+    lost: float
+    solution: StepSolution | None = None
+
+
+@dataclass(frozen=True)
+class _Steps:
+    """Steps of one point along the rows of a path: `values` by name, time steps (n,), temperatures (n,) or None."""
+
+    update: GeneralUpdate | StressUpdate
+    values: Mapping[str, Any]
+    times: Array
+    temperatures: Array | None
+
+    def given(self, row: int) -> dict[str, Any]:
+        """Values at a row, the temperature among them."""
+        heat = self.update.law.temperature
+        if heat is None or self.temperatures is None:
+            return dict(self.values)
+        return {**self.values, heat.name: self.temperatures[row]}
+
+    def at(self, row: int, driven: Array, old: Array, before: _Answer | None) -> _Answer:
+        """The step at a row to the strain (or stress) `driven`, from the packed state `old` (1, m)."""
+        if isinstance(self.update, GeneralUpdate):
+            return self._program(self.update, row, driven, old, before)
+        return self._inverse(self.update, row, driven, old)
+
+    def _program(self, update: GeneralUpdate, row: int, driven: Array, old: Array, before: _Answer | None) -> _Answer:
+        numbers, temperature = update.arguments(self.given(row), 1)
+        start = None if before is None else before.solution
+        found = update.solve(driven[None], old, self.times[row], numbers, temperature, tangent=True, start=start)
+        answer, tangent = update.response(found)
+        assert tangent is not None  # asked for
+        new, lost = update.outcome(answer if update.turned else driven[None], old, found)
+        return _Answer(answer[0], tangent[0], int(found.status[0]), new, float(lost[0]), found)
+
+    def _inverse(self, update: StressUpdate, row: int, driven: Array, old: Array) -> _Answer:
+        from .update import packed_values
+
+        heat, rest = thermal_input(update.law, self.given(row), 1)
+        rows = update.coefficients(packed_values(update, rest), float(self.times[row]), heat.temperature)
+        new, eps, compliance, lost = np.empty_like(old), np.empty((1, 6)), np.empty((1, 36)), np.empty(1)
+        status = np.empty(1, dtype=np.int64)
+        sig = np.ascontiguousarray(driven[None])
+        update.pointers.run(sig, old, new, eps, compliance, True, lost, status, rows)
+        return _Answer(eps[0], compliance.reshape(6, 6), int(status[0]), new, float(lost[0]))
+
+
 def follow(
-    update: GeneralUpdate,
+    update: GeneralUpdate | StressUpdate,
     base: Array,
     goal: Array,
     z: Array,
@@ -27,44 +89,39 @@ def follow(
     start: Array,
     packed: Array,
     values: Mapping[str, Any],
-    steps: Array,
+    times: Array,
     temperatures: Array | None,
 ) -> tuple[int, float, float, dict[str, Array]]:
-    """Find y with v σ(base + z y) = goal at every row, by damped Newton. Returns (failed row or −1, residual, stress scale, columns).
+    """Find y with v σ(base + z y) = goal at every row, by damped Newton; driven by the stress v ε(base + z y) = goal. Returns (failed row
+    or −1, residual, scale of the answer, columns).
 
-    `packed` (1, m) is the state at the start, `steps` (n,) the time steps, `temperatures` (n,) where the law has one. The residual is
-    brought to 1e-11 of the stress; where the law is too stiff for that, what stands still below 1e-9 is taken.
+    `packed` (1, m) is the state at the start, `times` (n,) the time steps, `temperatures` (n,) where the law has one. The residual is
+    brought to 1e-11 of the answer; where the law is too stiff for that, what stands still below 1e-9 is taken.
     """
     n = len(base)
     found = {"eps": np.zeros((n, 6)), "sig": np.zeros((n, 6)), "state": np.zeros((n, update.state_size))}
     found |= {"psi": np.zeros(n), "dissipation": np.zeros(n)}
-    eps, old, highest, total, warm = start, packed, 0.0, 0.0, None
-    name = None if update.law.temperature is None else update.law.temperature.name
+    steps = _Steps(update, values, times, temperatures)
+    turned = update.formulation == "stress"
+    last, old, highest, total, warm = start, packed, 0.0, 0.0, None
     for row in range(n):
-        given = dict(values) if name is None or temperatures is None else {**values, name: temperatures[row]}
-        numbers, temperature = update.arguments(given, 1)
-
-        def evaluate(strain: Array, before: Any) -> Any:
-            return update.solve(strain[None], old, steps[row], numbers, temperature, tangent=True, start=before)  # noqa: B023
-
-        along = z.T @ (eps - base[row]) / np.maximum((z * z).sum(axis=0), 1e-300)
+        along = z.T @ (last - base[row]) / np.maximum((z * z).sum(axis=0), 1e-300)
         trial = base[row] + z @ along
-        out = evaluate(trial, warm)
+        out = steps.at(row, trial, old, warm)
         for turn in range(TURNS):
-            stress = out.slopes[0, :6]
-            gap = v @ stress - goal[row]
-            level = max(float(np.abs(stress).max()), float(np.abs(goal[row]).max(initial=0.0)), 1e-3 * highest)
+            gap = v @ out.answer - goal[row]
+            level = max(float(np.abs(out.answer).max()), float(np.abs(goal[row]).max(initial=0.0)), 1e-3 * highest)
             size = float(np.abs(gap).max(initial=0.0))
-            if out.status[0] != 0:
+            if out.status != 0:
                 return row, size, level, found
             if size <= TOLERANCE * level:
                 break
-            step = -np.linalg.lstsq(v @ out.tangent[0] @ z, gap, rcond=1e-13)[0]
+            step = -np.linalg.lstsq(v @ out.tangent @ z, gap, rcond=1e-13)[0]
             factor = 1.0
             while factor > 1e-4:
-                new = evaluate(trial + factor * (z @ step), out)
-                rest = float(np.abs(v @ new.slopes[0, :6] - goal[row]).max())
-                if new.status[0] == 0 and rest < (1 - 0.1 * factor) * size:
+                new = steps.at(row, trial + factor * (z @ step), old, out)
+                rest = float(np.abs(v @ new.answer - goal[row]).max())
+                if new.status == 0 and rest < (1 - 0.1 * factor) * size:
                     break
                 factor *= 0.5
             else:
@@ -74,11 +131,11 @@ def follow(
             trial, out = trial + factor * (z @ step), new
             if turn == TURNS - 1:
                 return row, rest, level, found
-        lost_state, lost = update.outcome(trial[None], old, out)
-        eps, old, warm = trial, lost_state, out
-        highest = max(highest, float(np.abs(out.slopes[0, :6]).max()))
-        total += float(lost[0])
-        found["eps"][row], found["sig"][row], found["state"][row] = eps, out.slopes[0, :6], old[0]
-        found["psi"][row] = update.energy(eps, update.packing.unpack(old), **given)[0]
+        last, old, warm = trial, out.state, out
+        highest = max(highest, float(np.abs(out.answer).max()))
+        total += out.lost
+        found["eps"][row], found["sig"][row] = (out.answer, trial) if turned else (trial, out.answer)
+        found["state"][row] = old[0]
+        found["psi"][row] = update.energy(found["eps"][row], update.packing.unpack(old), **steps.given(row))[0]
         found["dissipation"][row] = total
     return -1, 0.0, highest, found

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError, Status
+from ..errors import DeclarationError, InputError, Status
 from ..potentials import Law
 from .batch import INFEASIBLE, BatchSolution, interior_start, solve_batch
 from .declared import DeclaredStep, declared_step, packed_layout, strain_flows
@@ -41,7 +41,7 @@ class Part:
 @dataclass
 class StepSolution:
     """`slopes` (n, 6 + …): ∂W/∂(ε, X_n, ε_n), stress, minus the forces, minus σ^ir; `increment` X − X_n; codes of `Status`; `parts`
-    by group of points."""
+    by group of points. Driven by the stress, slopes and tangent begin with −ε and minus the compliance."""
 
     slopes: Array
     tangent: Array | None
@@ -54,20 +54,28 @@ class StepSolution:
 
 @dataclass
 class GeneralStep:
-    """Programs of one law at parameter values and a time step, made when asked for and kept."""
+    """Programs of one law at parameter values and a time step, made when asked for and kept; driven by the stress if `stress`."""
 
     law: Law
     parameters: Mapping[Any, float]
     dt: float
     declared: DeclaredStep
+    stress: bool = False
     _programs: dict[bytes, StepProgram] = field(default_factory=dict)
     _affine: tuple[Array, StepProgram] | bool | None = None
 
     @classmethod
-    def of(cls, law: Law, values: Mapping[str, float], dt: float, declared: DeclaredStep | None = None) -> GeneralStep:
-        """`values` by name, checked already."""
+    def of(
+        cls,
+        law: Law,
+        values: Mapping[str, float],
+        dt: float,
+        declared: DeclaredStep | None = None,
+        stress: bool = False,
+    ) -> GeneralStep:
+        """`values` by name, checked already; driven by the stress, all of ψ is in the program."""
         numbers = {p: float(values[p.name]) for p in law.parameters}
-        return cls(law, numbers, dt, declared or declared_step(law))
+        return cls(law, numbers, dt, declared or declared_step(law, whole=stress), stress)
 
     @property
     def program_size(self) -> int:
@@ -88,7 +96,12 @@ class GeneralStep:
         make = flow_of_dual if forms.dual else flow_of_rates
         flow = None if forms.flow is None else make(forms.flow, self.dt)
         _, size = packed_layout(self.law)
-        found = assemble(forms.energy, flow, forms.moved, size, strain_flows(self.law))
+        found = assemble(forms.energy, flow, forms.moved, size, strain_flows(self.law), self.stress)
+        if found.unbounded and self.stress:
+            raise DeclarationError(
+                f"law '{self.law.name}': psi does not resist every strain, its conjugate psi* is not finite; "
+                "use the strain formulation"
+            )
         if found.unbounded:
             raise InputError(
                 f"law '{self.law.name}': the step has no solution for these values: the energy decreases without bound"
@@ -157,7 +170,8 @@ class GeneralStep:
         tolerance: float = TOLERANCE,
         start: StepSolution | None = None,
     ) -> StepSolution:
-        """The step at every point, (n, 6) strains, (n, …) packed old states; `method` "general", or "conic" to polish clarabel's answer.
+        """The step at every point, (n, 6) strains (or stresses), (n, …) packed old states; `method` "general", or "conic" to polish
+        clarabel's answer.
 
         `start`, an earlier solution at the same number of points and groups, warms the engine.
         """

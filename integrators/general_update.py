@@ -30,7 +30,10 @@ KEPT = 8
 
 @dataclass(frozen=True)
 class GeneralUpdate:
-    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast)."""
+    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast).
+
+    Of the formulation "stress" the step takes stresses, with the strain among the unknowns of the program.
+    """
 
     law: Law
     packing: StatePacking
@@ -38,12 +41,16 @@ class GeneralUpdate:
     tangent: bool = True
     solver: str = "general"
     why: str = ""
+    formulation: str = "strain"
     _steps: dict[Any, GeneralStep] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
-    def of(cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "") -> GeneralUpdate:
+    def of(
+        cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "", formulation: str = "strain"
+    ) -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
-        found = cls(law, StatePacking.of(law), declared_step(law, whole=solver != "general"), tangent, solver, why)
+        declared = declared_step(law, whole=solver != "general" or formulation == "stress")
+        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation)
         found._rehearse()
         return found
 
@@ -75,24 +82,37 @@ class GeneralUpdate:
         Raises `InputError` for bad input, for values at which ψ or φ* is not convex and where f(0) > 0, and `ConvergenceError`, naming the
         first points, where the step has no solution or none is found.
         """
+        from .stress_input import raise_stress_failures, stress_array
         from .update import StepResult, raise_failures, strain_array
 
-        eps = strain_array(eps_new)
-        old = self.packing.pack(state, len(eps))
-        heat, given = thermal_input(self.law, values, len(eps))
+        driven = stress_array(eps_new) if self.turned else strain_array(eps_new)
+        old = self.packing.pack(state, len(driven))
+        heat, given = thermal_input(self.law, values, len(driven))
         numbers = self.law.admissible_values(given)
         temperature = heat.temperature if self.law.temperature is not None else None
-        found, gap = self.solve(eps, old, dt, numbers, temperature), None
-        raise_failures(found.status, eps)
+        found, gap = self.solve(driven, old, dt, numbers, temperature), None
+        (raise_stress_failures if self.turned else raise_failures)(found.status, driven)
+        answer, tangent = self.response(found)
+        eps, stress = (answer, driven) if self.turned else (driven, answer)
         new, lost = self.outcome(eps, old, found)
         if certify:
             from .certificate import solution_gap
 
-            gap = solution_gap(found, len(eps))
+            gap = solution_gap(found, len(driven))
         named = self.packing.unpack(new)
         entropy, flux = thermal_results(self.law, heat, eps, named, given)
-        stress = found.slopes[:, :6].copy()
-        return StepResult(stress, found.tangent, named, lost, found.status, gap, entropy, flux, eps)
+        return StepResult(stress, tangent, named, lost, found.status, gap, entropy, flux, eps)
+
+    @property
+    def turned(self) -> bool:
+        """True if the stress drives the step."""
+        return self.formulation == "stress"
+
+    def response(self, found: StepSolution) -> tuple[Array, Array | None]:
+        """(stress, ∂σ/∂ε) of a solution, or (strain, ∂ε/∂σ) of one that is driven by the stress."""
+        if not self.turned:
+            return found.slopes[:, :6].copy(), found.tangent
+        return -found.slopes[:, :6], None if found.tangent is None else -found.tangent
 
     def arguments(self, values: Mapping[str, Any], count: int) -> tuple[dict[str, float], Array | None]:
         """Checked parameters by name, and the temperature at every point."""
@@ -108,7 +128,7 @@ class GeneralUpdate:
         if key not in self._steps:
             if len(self._steps) >= KEPT:
                 self._steps.pop(next(iter(self._steps)))
-            self._steps[key] = GeneralStep.of(self.law, numbers, float(dt), self.declared)
+            self._steps[key] = GeneralStep.of(self.law, numbers, float(dt), self.declared, self.turned)
         return self._steps[key]
 
     def solve(
@@ -163,7 +183,7 @@ class GeneralUpdate:
     def _rehearse(self) -> None:
         """Make the program once at harmless values, so that a term without conic form is refused when the law is compiled."""
         numbers = {p.name: _harmless(p) for p in self.law.parameters}
-        step = GeneralStep.of(self.law, numbers, 1.0, self.declared)
+        step = GeneralStep.of(self.law, numbers, 1.0, self.declared, self.turned)
         temperature = None if self.law.temperature is None else np.array([300.0])
         try:
             rows = self.declared.coefficient_rows(step.parameters, np.zeros((1, self.state_size)), temperature)

@@ -3,7 +3,8 @@
 Per component the strain or the stress is prescribed. The unknown strains solve σ_i(ε) = σ̄_i by damped semismooth Newton with the
 consistent tangent; for pure strain and stress control that system is the gradient of the convex incremental energy W_n(ε) − σ̄:ε, and
 the line search uses its slope. A condition on the trace (volume strain, or mean pressure) ties the normal components that have no
-prescription of their own: they share one stress.
+prescription of their own: they share one stress. An update that is driven by the stress follows the same path with the roles turned:
+the unknown stresses solve ε_i(σ) = ε̄_i, see `stress_path`.
 """
 
 from __future__ import annotations
@@ -19,6 +20,8 @@ from ..errors import ConvergenceError, InputError
 from .general_path import follow
 from .general_update import GeneralUpdate
 from .path_loop import path_loop
+from .stress_path import stress_plan
+from .stress_update import StressUpdate
 from .thermal import thermal_input, thermal_results
 from .update import Array, Update, packed_values
 
@@ -47,7 +50,7 @@ class History:
 
 
 def drive_arrays(
-    update: Update | GeneralUpdate,
+    update: Update | GeneralUpdate | StressUpdate,
     control: Any,
     targets: Any,
     values: Mapping[str, Any],
@@ -64,7 +67,8 @@ def drive_arrays(
 
     `control` (6,): True where the stress [Pa] is prescribed, False where the strain [-] is; `targets` (n, 6) the prescribed values,
     Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
-    condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the stress scale;
+    condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the scale of the stress (of the
+    strain for an update driven by the stress);
     `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference) and are named in
     messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
     Raises `InputError`, or `ConvergenceError` with the row.
@@ -94,14 +98,21 @@ def drive_arrays(
         raise InputError(
             f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})"
         )
-    plan = _plan(mask, free, goals, trace, condition)
+    turned = _turned(update)
+    plan = (
+        (_Plan(*stress_plan(mask, free, goals, trace, condition)))
+        if turned
+        else _plan(mask, free, goals, trace, condition)
+    )
     try:
         start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
     except (TypeError, ValueError):
         start = np.full(6, np.nan)
     if not np.isfinite(start).all():
         raise InputError("drive: initial_strain must be six finite Mandel components")
-    if isinstance(update, GeneralUpdate):
+    if turned:
+        start = np.zeros(6)  # only where the search begins: the stress there is not known
+    if isinstance(update, GeneralUpdate) or (isinstance(update, StressUpdate) and not update.compiled_path):
         return _run_general(update, plan, values, start, initial_state, times, temperatures)
     given = dict(values)
     if temperatures is not None:
@@ -154,7 +165,7 @@ def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace:
 
 
 def _run(
-    update: Update,
+    update: Update | StressUpdate,
     plan: _Plan,
     given: Mapping[str, Any],
     start: Array,
@@ -165,10 +176,12 @@ def _run(
     n = len(plan.base)
     heat, values = thermal_input(update.law, given, n)
     parameters = packed_values(update, values)
-    pointers = update.pointers
+    pointers: Any = update.pointers
+    turned = _turned(update)
     # a law that is not viscous has one row of coefficients for all steps
     steps = _time_steps(times, n) if update.module.VISCOUS and times is not None else 1.0
-    coefficients = pointers.coefficients(parameters, steps, heat.temperature)
+    found = update if isinstance(update, StressUpdate) else pointers
+    coefficients = found.coefficients(parameters, steps, heat.temperature)
     eps, sig, state = np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, update.state_size))
     dissipation = np.zeros(n)
     old = update.pack(initial_state, 1)[0]
@@ -186,23 +199,23 @@ def _run(
         plan.symmetric,
         start,
         old,
-        eps,
-        sig,
+        sig if turned else eps,
+        eps if turned else sig,
         state,
         dissipation,
         tolerance,
         TURNS,
     )
-    _raise_failure(update.law.name, failed, residual, scale, times)
+    _raise_failure(update, failed, residual, scale, times)
     psi = update.energies(eps, state, heat.temperature, parameters)
-    found = update.unpack(state)
-    entropy, _ = thermal_results(update.law, heat, eps, found, values)
+    named = update.unpack(state)
+    entropy, _ = thermal_results(update.law, heat, eps, named, values)
     temperature = None if update.law.temperature is None else np.broadcast_to(heat.temperature, (n,)).copy()
-    return History(eps, sig, found, psi, dissipation, np.zeros(n, dtype=np.int64), temperature, entropy)
+    return History(eps, sig, named, psi, dissipation, np.zeros(n, dtype=np.int64), temperature, entropy)
 
 
 def _run_general(
-    update: GeneralUpdate,
+    update: GeneralUpdate | StressUpdate,
     plan: _Plan,
     values: Mapping[str, Any],
     start: Array,
@@ -218,11 +231,16 @@ def _run_general(
     failed, residual, scale, found = follow(
         update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, _time_steps(times, n), temperatures
     )
-    _raise_failure(update.law.name, failed, residual, scale, times)
+    _raise_failure(update, failed, residual, scale, times)
     unpacked = update.packing.unpack(found["state"])
     return History(
         found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], np.zeros(n, dtype=np.int64)
     )
+
+
+def _turned(update: Any) -> bool:
+    """True if the update is driven by the stress."""
+    return isinstance(update, StressUpdate) or (isinstance(update, GeneralUpdate) and update.turned)
 
 
 def _time_steps(times: Any, count: int) -> Array:
@@ -235,11 +253,14 @@ def _time_steps(times: Any, count: int) -> Array:
     return np.concatenate([[float(steps[0]) if steps.size else 1.0], steps])
 
 
-def _raise_failure(name: str, failed: int, residual: float, scale: float, times: Any) -> None:
+def _raise_failure(update: Any, failed: int, residual: float, scale: float, times: Any) -> None:
     if failed < 0:
         return
     when = "" if times is None else f" (t = {float(times[failed]):g})"
-    raise ConvergenceError(
-        f"law '{name}': the path fails at row {failed}{when}: residual {residual:.3g} Pa at stress scale {scale:.3g} Pa; "
-        "take smaller steps, or the prescribed stress cannot be carried"
-    )
+    if _turned(update):
+        what = f"residual {residual:.3g} at strain scale {scale:.3g}"
+        remedy = "take smaller steps, or use the strain formulation: stresses at a limit do not tell their strains"
+    else:
+        what = f"residual {residual:.3g} Pa at stress scale {scale:.3g} Pa"
+        remedy = "take smaller steps, or the prescribed stress cannot be carried"
+    raise ConvergenceError(f"law '{update.law.name}': the path fails at row {failed}{when}: {what}; {remedy}")

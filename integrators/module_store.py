@@ -24,8 +24,8 @@ def module_source(law: Law, dimension: str = "3d") -> str:
         return declared_module(law, str(reason))
 
 
-def load_module(law: Law, solver: str = "auto", size: int = 6) -> ModuleType:
+def load_module(law: Law, solver: str = "auto", size: int = 6, formulation: str = "strain") -> ModuleType:
     """Generated module of the law for tensors of `size` components, from memory, else from disk, else written now. The key is formed
     before any differentiation."""
-    key = content_hash(law.text, solver, str(size), rooms_hash())
-    return load_text("laws", f"fenchel_law_{law.name}_{key}", lambda: closed_module(law, solver, size))
+    key = content_hash(law.text, solver, str(size), formulation, rooms_hash())
+    return load_text("laws", f"fenchel_law_{law.name}_{key}", lambda: closed_module(law, solver, size, formulation))

@@ -10,12 +10,14 @@ from two canonical forms: ψ over (ε, X), and either φ* over the forces Y or �
 so that X = X_n + D is a linear function of the multipliers and the step is one minimisation (Rockafellar 1970, §30). Equalities are
 eliminated by an orthonormal basis of their null space; the quadratic is brought to the identity on its range; every cone block is scaled to
 norm one. Stress and forces are derivatives of W by its data (envelope theorem), exact also where ψ has kinks.
+
+Driven by the stress the strain is one of the unknowns, min over (ε, x) of W − σ:ε with d = (σ, …): the minimum is −W*(σ), its slope −ε.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -92,7 +94,8 @@ def flow_of_rates(form: CanonicalForm, dt: float) -> FlowForm:
 
 @dataclass(frozen=True)
 class StepProgram:
-    """Reduced program min ½ yᵀ diag(p) y + qᵀy s.t. h − Gy ∈ K, q = q0 + q1 d, h = h0 + h1 d; d = (ε, X_n, ε_n if `strain_flows`).
+    """Reduced program min ½ yᵀ diag(p) y + qᵀy s.t. h − Gy ∈ K, q = q0 + q1 d, h = h0 + h1 d; d = (ε, X_n, ε_n if `strain_flows`),
+    with σ in place of ε if `stress`.
 
     W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution.
     """
@@ -115,6 +118,7 @@ class StepProgram:
     state_size: int
     strain_flows: bool
     unbounded: bool
+    stress: bool = False
 
     def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array, Array]:
         """(kinds, starts, sizes, first and second number of the cone or scalar term)."""
@@ -137,39 +141,48 @@ class StepProgram:
 
 
 def assemble(
-    energy: CanonicalForm, flow: FlowForm | None, moved: Sequence[int], state_size: int, strain_flows: bool
+    energy: CanonicalForm,
+    flow: FlowForm | None,
+    moved: Sequence[int],
+    state_size: int,
+    strain_flows: bool,
+    stress: bool = False,
 ) -> StepProgram:
-    """The step of ψ = `energy` over (ε, X, aux) with `flow` on the places `moved` of (ε, X) (ε: 0 … 5)."""
+    """The step of ψ = `energy` over (ε, X, aux) with `flow` on the places `moved` of (ε, X) (ε: 0 … 5); driven by σ if `stress`."""
     m = state_size
     width = 6 + m + (6 if strain_flows else 0)
     aux = energy.q.size - energy.first
     flows = 0 if flow is None else flow.q.size
-    n = aux + flows
-    # B: (1, d, x) ↦ (ε, X, aux of ψ); x = (aux, w)
+    free = 6 if stress else 0
+    n = free + aux + flows
+    # B: (1, d, x) ↦ (ε, X, aux of ψ); x = (ε if driven by σ, aux, w)
     size = 6 + m + aux
+    first, own = 1 + width + free, 1 + width + free + aux
+    strain = slice(1 + width, first) if stress else slice(1, 7)
     B = np.zeros((size, 1 + width + n))
-    B[: 6 + m, 1 : 7 + m] = np.eye(6 + m)
-    B[6 + m :, 1 + width : 1 + width + aux] = np.eye(aux)
+    B[:6, strain] = np.eye(6)
+    B[6 : 6 + m, 7 : 7 + m] = np.eye(m)
+    B[6 + m :, first:own] = np.eye(aux)
     E_rows: list[Array] = []
     if flow is not None:
         places = np.asarray(moved)
         internal = places >= 6
-        B[places[internal], 1 + width + aux :] += flow.L[internal]
+        B[places[internal], own:] += flow.L[internal]
         B[places[internal], 0] += flow.l0[internal]
         if strain_flows:
             # L w + l₀ = ε − ε_n
             row = np.zeros((6, 1 + width + n))
             row[:, 0] = flow.l0[~internal]
-            row[:, 1 + width + aux :] = flow.L[~internal]
-            row[:, 1:7] -= np.eye(6)
+            row[:, own:] = flow.L[~internal]
+            row[:, strain] -= np.eye(6)
             row[:, 7 + m : 13 + m] += np.eye(6)
             E_rows.append(row)
         row = np.zeros((flow.E.shape[0], 1 + width + n))
         row[:, 0] = -flow.e0
-        row[:, 1 + width + aux :] = flow.E
+        row[:, own:] = flow.E
         E_rows.append(row)
     W = np.zeros((flows, 1 + width + n))
-    W[:, 1 + width + aux :] = np.eye(flows)
+    W[:, own:] = np.eye(flows)
     row = energy.E @ B
     row[:, 0] -= energy.e
     E_rows.append(row)
@@ -194,7 +207,10 @@ def assemble(
     full[0, :] += slope
     full[:, 0] += slope
     full[0, 0] += 2.0 * (energy.constant + (0.0 if flow is None else flow.constant))
-    return _reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows)
+    if stress:
+        full[1:7, strain] -= np.eye(6)
+        full[strain, 1:7] -= np.eye(6)
+    return replace(_reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows), stress=stress)
 
 
 def _column_scale(P: Array, E: Array, G: Array) -> Array:

@@ -253,12 +253,12 @@ def build_update(
     """Choose the cheapest exact method for the law: `closed`, else `reduced`, else `principal`, else `general` (any convex law); or take
     the one that is named. `.solver` and `.why` of what is returned say which and why.
 
-    `dimension` is one of `DIMENSIONS`; with `precision` "float32" the arrays of generated steps are in single precision, their arithmetic
-    stays double; `threads` share the points.
+    `dimension` is one of `DIMENSIONS`; `formulation` "strain" or "stress", what drives the step; with `precision` "float32" the arrays of
+    generated steps are in single precision, their arithmetic stays double; `threads` share the points.
     """
     kinds = dimension_named(dimension)
-    if formulation != "strain":
-        raise InputError(f"formulation {formulation!r} is not available for updates; it is 'strain'")
+    if formulation not in ("strain", "stress"):
+        raise InputError(f"formulation {formulation!r} is not known; it is 'strain' or 'stress'")
     if solver not in ("auto", *REDUCED, *GENERAL, EXPLICIT):
         raise InputError(
             f"solver {solver!r} is not known; it is one of auto, {', '.join((*REDUCED, *GENERAL, EXPLICIT))}"
@@ -269,6 +269,10 @@ def build_update(
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
+    if formulation == "stress":
+        from .stress_update import build_stress_update
+
+        return build_stress_update(law, solver, tangent)
     why = "asked for by name"
     if solver == "auto" or solver in REDUCED:
         try:

@@ -13,7 +13,7 @@ from .signs import SIGNS, Signs, turn_columns, turn_path
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
-    from fenchel.integrators import History, Update
+    from fenchel.integrators import History, StressUpdate, Update
 
 __all__ = ["register"]
 
@@ -55,7 +55,7 @@ def _drive(
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
     """
     from fenchel.errors import InputError
-    from fenchel.integrators import Update, drive, read_path
+    from fenchel.integrators import StressUpdate, Update, drive, read_path
     from fenchel.integrators.path_file import history_columns
     from fenchel.potentials import load_law
 
@@ -65,7 +65,7 @@ def _drive(
     plan = turn_path(read_path(path), signs)
     declared = load_law(law)
     update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
-    if certify and not isinstance(update, Update):
+    if certify and not isinstance(update, (Update, StressUpdate)):
         raise InputError(
             "--certify needs a generated step; the general method is its own certificate: leave --certify out"
         )
@@ -105,21 +105,24 @@ def _write(output: Path, text: str) -> None:
     replace_file(output.resolve(), text.encode())
 
 
-def _gaps(update: Update, history: History, values: dict[str, float], times: Any) -> Any:
+def _gaps(update: Update | StressUpdate, history: History, values: dict[str, float], times: Any) -> Any:
     """Duality gap of every step: each row once more, from the state of the row before."""
     import numpy as np
 
+    from fenchel.integrators import StressUpdate
+
+    driven = history.sig if isinstance(update, StressUpdate) else history.eps
     before = {name: np.concatenate([np.zeros_like(state[:1]), state[:-1]]) for name, state in history.state.items()}
     given: dict[str, Any] = dict(values)
     if history.temperature is not None and update.law.temperature is not None:
         given[update.law.temperature.name] = history.temperature
     if not update.module.VISCOUS or len(times) < 2:
-        return update(history.eps, before, certify=True, **given).gap
+        return update(driven, before, certify=True, **given).gap
     found = []
     for row, dt in enumerate(np.diff(times, prepend=2.0 * times[0] - times[1])):
         state = {name: value[row : row + 1] for name, value in before.items()}
         own = {k: v[row] if np.ndim(v) else v for k, v in given.items()}
-        gap = update(history.eps[row], state, float(dt), certify=True, **own).gap
+        gap = update(driven[row], state, float(dt), certify=True, **own).gap
         assert gap is not None  # certify=True asks for it
         found.append(gap[0])
     return np.array(found)
