@@ -96,6 +96,14 @@ def step_pointers(module: ModuleType) -> StepPointers:
         return StepPointers(closed_step(), no_method(), no_law(), rest, plan, module.coefficients_, False)
     if method.endswith("affine"):
         plan[METHOD_START] = module.SIZE
-        return StepPointers(reduced_step(), affine_method(), no_law(), rest, plan, module.coefficients_, True)
+        return StepPointers(
+            reduced_step(),
+            affine_method(int(plan[UNKNOWNS]), int(plan[SURFACES] + plan[ORDERS])),
+            no_law(),
+            rest,
+            plan,
+            module.coefficients_,
+            True,
+        )
     chosen = single_method() if method.endswith("single") else projection_method()
     return StepPointers(reduced_step(), chosen, module.functions_, rest, plan, module.coefficients_, False)
