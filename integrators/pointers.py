@@ -96,6 +96,7 @@ def step_pointers(module: ModuleType, precision: str = "float64") -> StepPointer
         return StepPointers(step, no_method(), no_law(), rest, plan, module.coefficients_, False)
     if method.endswith("affine"):
         plan[METHOD_START] = module.SIZE
-        return StepPointers(step, affine_method(), no_law(), rest, plan, module.coefficients_, True)
-    chosen = single_method() if method.endswith("single") else projection_method()
+        chosen = affine_method(int(plan[UNKNOWNS]), int(plan[SURFACES] + plan[ORDERS]))
+        return StepPointers(step, chosen, no_law(), rest, plan, module.coefficients_, True)
+    chosen = single_method(plan) if method.endswith("single") else projection_method()
     return StepPointers(step, chosen, module.functions_, rest, plan, module.coefficients_, False)

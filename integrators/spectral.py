@@ -21,29 +21,39 @@ _FOLDER = kernels_hash()
 def eigen(t, out):
     """Eigenvalues in `out[0:3]`, orthonormal eigenvectors as columns of `out[3:12]` (row-major 3×3), of the Mandel tensor `t`."""
     half = 0.7071067811865476
-    scale = 0.0
-    for i in range(6):
-        scale = max(scale, abs(t[i]))
-    for i in range(12):
-        out[i] = 0.0
-    if scale == 0.0 or not scale < math.inf:
-        out[3] = out[7] = out[11] = 1.0
-        return
-    a, b, c = t[0] / scale, t[1] / scale, t[2] / scale
-    f, e, d = half * t[3] / scale, half * t[4] / scale, half * t[5] / scale
+    a, b, c = t[0], t[1], t[2]
+    f, e, d = half * t[3], half * t[4], half * t[5]
+    scale = max(max(max(abs(a), abs(b)), max(abs(c), abs(f))), max(abs(e), abs(d)))
+    unit = 1.0
+    if not 1e-40 < scale < 1e40:
+        # out of the range in which sixth powers are safe
+        if scale == 0.0 or not scale < math.inf:
+            for i in range(12):
+                out[i] = 0.0
+            out[3] = out[7] = out[11] = 1.0
+            return
+        unit = scale
+        a, b, c, f, e, d, scale = a / unit, b / unit, c / unit, f / unit, e / unit, d / unit, 1.0
     mean = (a + b + c) / 3.0
     x, y, z = a - mean, b - mean, c - mean
     j2 = 0.5 * (x * x + y * y + z * z) + f * f + e * e + d * d
-    if j2 < 1e-30:
+    if j2 < 1e-30 * (scale * scale):
+        for i in range(12):
+            out[i] = 0.0
         out[0], out[1], out[2] = t[0], t[1], t[2]
         out[3] = out[7] = out[11] = 1.0
         return
     j3 = x * (y * z - f * f) - d * (d * z - f * e) + e * (d * f - y * e)
-    radius = math.sqrt(j2 / 3.0)
-    cosine = min(1.0, abs(j3) / (2.0 * radius * radius * radius))
-    root = 2.0 * radius * math.cos(math.acos(cosine) / 3.0)
-    if j3 < 0.0:
-        root = -root
+    third = j2 * (1.0 / 3.0)
+    radius = math.sqrt(third)
+    # C = cos(acos(k)/3) is the root of 4 C³ − 3 C = k: a polynomial within 6e-7, one step of Halley
+    k = min(1.0, abs(j3) / (2.0 * radius * third))
+    k2 = k * k
+    root = (0.86602598 + 0.16662256 * k) + k2 * ((0.02197778 * k - 0.04755362) + k2 * (0.00198191 * k - 0.00905417))
+    miss = (4.0 * root * root - 3.0) * root - k
+    slope = 12.0 * root * root - 3.0
+    root -= miss * slope / (slope * slope - 12.0 * root * miss)
+    root = math.copysign(2.0 * radius * root, j3)
     # rows of dev T − root I; their largest cross product spans the kernel
     p0, p1, p2 = x - root, y - root, z - root
     u0, u1, u2 = d * f - e * p1, e * d - p0 * f, p0 * p1 - d * d
@@ -56,20 +66,19 @@ def eigen(t, out):
         u0, u1, u2, nu = w0, w1, w2, nw
     size = 1.0 / math.sqrt(nu)
     u0, u1, u2 = u0 * size, u1 * size, u2 * size
-    # an orthonormal basis (v, w) of the complement of u
-    if abs(u0) > abs(u2):
-        size = 1.0 / math.sqrt(u0 * u0 + u1 * u1)
-        v0, v1, v2 = -u1 * size, u0 * size, 0.0
-    else:
-        size = 1.0 / math.sqrt(u1 * u1 + u2 * u2)
-        v0, v1, v2 = 0.0, -u2 * size, u1 * size
-    w0, w1, w2 = u1 * v2 - u2 * v1, u2 * v0 - u0 * v2, u0 * v1 - u1 * v0
+    # an orthonormal basis (v, w) of the complement of u (Duff et al. 2017)
+    sign = math.copysign(1.0, u2)
+    share = -1.0 / (sign + u2)
+    both = u0 * u1 * share
+    v0, v1, v2 = 1.0 + sign * u0 * u0 * share, sign * both, -sign * u0
+    w0, w1, w2 = both, sign + u1 * u1 * share, -u1
     s0, s1, s2 = a * v0 + d * v1 + e * v2, d * v0 + b * v1 + f * v2, e * v0 + f * v1 + c * v2
     r0, r1, r2 = a * w0 + d * w1 + e * w2, d * w0 + b * w1 + f * w2, e * w0 + f * w1 + c * w2
     vv, vw, ww = v0 * s0 + v1 * s1 + v2 * s2, v0 * r0 + v1 * r1 + v2 * r2, w0 * r0 + w1 * r1 + w2 * r2
-    if vw != 0.0:
-        ratio = (ww - vv) / (2.0 * vw)
-        tangent = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + math.hypot(1.0, ratio))
+    gap = ww - vv
+    size = math.sqrt(gap * gap + 4.0 * vw * vw)
+    if size > 0.0:
+        tangent = 2.0 * vw / (gap + math.copysign(size, gap))
         cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
         sine = tangent * cosine
         v0, w0 = cosine * v0 - sine * w0, sine * v0 + cosine * w0
@@ -77,7 +86,7 @@ def eigen(t, out):
         v2, w2 = cosine * v2 - sine * w2, sine * v2 + cosine * w2
         vv, ww = vv - tangent * vw, ww + tangent * vw
     uu = u0 * (a * u0 + d * u1 + e * u2) + u1 * (d * u0 + b * u1 + f * u2) + u2 * (e * u0 + f * u1 + c * u2)
-    out[0], out[1], out[2] = uu * scale, vv * scale, ww * scale
+    out[0], out[1], out[2] = uu * unit, vv * unit, ww * unit
     out[3], out[4], out[5] = u0, v0, w0
     out[6], out[7], out[8] = u1, v1, w1
     out[9], out[10], out[11] = u2, v2, w2
