@@ -77,15 +77,19 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
         width = m * m + n * n
         z, out = trial[point], found[point]
         plastic = False
-        worst = 0.0
+        worst, rounding = 0.0, 0.0
         for i in range(m):
             value = c[limit + i]
+            largest = abs(value)
             for k in range(n):
-                value += c[normal + i * n + k] * z[k]
+                part = c[normal + i * n + k] * z[k]
+                largest = max(largest, abs(part))
+                value += part
             f[i] = value
             if not value <= 0.0:
                 plastic = True
             worst = max(worst, abs(value) * c[scale + i])
+            rounding = max(rounding, largest * c[scale + i])
         status[point] = 0
         for k in range(2 * n + n * n):
             out[k] = 0.0
@@ -126,7 +130,8 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
                     best, least = face, miss
                     if miss <= 4e-16 * worst:
                         break
-        if best < 0 or not least <= 1e-9 * worst:
+        # barely outside all surfaces of an apex, f itself is rounding of its terms
+        if best < 0 or not least <= 1e-9 * worst + 1e-14 * rounding:
             status[point] = 3
             continue
         o = table + width * best
