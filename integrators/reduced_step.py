@@ -71,9 +71,11 @@ def _trial(e, x, c, plan, b, axes, trial):
         sphere += c[o + 1] * (x[p] + x[p + 1] + x[p + 2])
     if plan[KIND] == 0:
         if plan[NORM] > 0:
-            mean = (b[0] + b[1] + b[2]) / 3.0
-            for i in range(3):
-                b[i] -= mean
+            # twice: what rounding of a large mean leaves is no part of a small deviator
+            for _ in range(2):
+                mean = (b[0] + b[1] + b[2]) / 3.0
+                for i in range(3):
+                    b[i] -= mean
             trial[0] = norm6(b)
         for i in range(traces):
             o = plan[TRACE_START] + (2 + 2 * tensors) * i
@@ -165,6 +167,7 @@ def _principal_tangent(c, plan, axes, found, t, dyads):
     first = 2 * n
     g0, g1 = c[3], c[4]
     size = abs(axes[0]) + abs(axes[1]) + abs(axes[2])
+    own = c[plan[METRIC]] - c[plan[METRIC] + 1]
     _isotropic(c[0], c[1], t)
     for k in range(3):
         _dyad(axes, k, k, dyads[k])
@@ -187,6 +190,9 @@ def _principal_tangent(c, plan, axes, found, t, dyads):
         gap = axes[l] - axes[m]
         if abs(gap) > 1e-9 * size:
             theta = (found[l] - found[m]) / gap
+            # a projection turns no further than its trial: what rounding over a small gap makes beyond is cut off
+            if own > 0.0:
+                theta = min(max(theta, 0.0), 1.0 / own)
         else:
             theta = 0.5 * (found[first + n * l + l] + found[first + n * m + m]) - 0.5 * (
                 found[first + n * l + m] + found[first + n * m + l]
