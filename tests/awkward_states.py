@@ -1,8 +1,8 @@
-"""States at which steps are hard: increments of strain over 14 decades, with apexes, edges, corners, repeated and nearly repeated eigenvalues.
+"""States at which steps are hard: strains over 14 decades, with apexes, edges, corners, repeated and nearly repeated eigenvalues.
 
 Shares of `increments`: an eighth each of exactly repeated, nearly repeated (relative gap 1e-8, 1e-12, 1e-15), spherical, spherical up to
-rounding, zero strain, strong dilation (the apex of a cone) and general strains; the last eighth, and half of the general
-ones, are made so that the answer lies on an edge of a principal law or at the corner of two surfaces; of other laws they are general.
+rounding, zero strain, strong dilation (the apex of a cone) and general strains; the last eighth, and half of the general ones, are made
+so that the answer lies on an edge of a principal law or at the corner of two surfaces; of other laws they are general.
 """
 
 from __future__ import annotations

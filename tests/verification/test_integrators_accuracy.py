@@ -1,30 +1,34 @@
-"""Every law of the library on random states: the optimality conditions of the implicit step, its duality gap, and an unpolished conic program.
+"""Every law of the library on random states: optimality of the implicit step, its duality gap, and an unpolished conic program.
 
-States (`awkward_states`): half virgin, half strained before by three admissible steps; increments of 1e-12 to 1e+2 yield strains; an eighth each
-of exactly and nearly repeated eigenvalues, spherical, spherical up to rounding, zero, strongly dilating, and on edges or corners. What
-the answers are is counted as well: at least a tenth of them at the apex, where there is one, and at edges or corners.
+States (`awkward_states`): half virgin, half strained before by three admissible steps; increments of 1e-12 to 1e+2 yield strains; an eighth
+each of exactly and nearly repeated eigenvalues, spherical, spherical up to rounding, zero, strongly dilating, and on edges or corners.
+What the answers are is counted as well: at least a tenth of them at the apex, where there is one, and at edges or corners.
 
 Conditions (`step_optimality`, written from the theory alone), each to 1e-10 × yield stress + 100 × machine epsilon × ‖trial stress‖:
 
     σ = ∂ψ/∂ε and the forces −∂ψ/∂X at the new state;  f ≤ 0;  ΔX ∈ Δt ∂φ*(Y) + N_{f ≤ 0}(Y) as natural maps of direction, dilatancy,
     back strain and principal axes, with the whole subdifferential at apex and edge;  min(Gγ, −f) = 0;  the rate laws of viscous parts.
 
-"Yield stress" is the stress that a law names as its limit: C_0, sigma_y, sigma_t, c, a (half the preconsolidation pressure), W (width of the
-cap), sigma_0, tau_y; of laws without one 1e-3 E or 1e-3 mu_w. "Yield strain" is that stress over E. The floor of the energy is the
-energy of a shear at the yield stress, (yield stress)²/4G. Dissipation is compared with the support function (with φ + Δt φ* of viscous
-laws) to the tolerance of stress times Σ|ΔX|.
+"Yield stress" is the stress that a law names as its limit: C_0, sigma_y, sigma_t, c, a (half the preconsolidation pressure), W (width of
+the cap), sigma_0, tau_y; of laws without one 1e-3 E or 1e-3 mu_w. "Yield strain" is that stress over E. The floor of the energy is that of
+a shear at the yield stress, (yield stress)²/4G. Dissipation is compared with the support function (with φ + Δt φ* of viscous laws) to the
+tolerance of stress times Σ|ΔX|.
+
+The tangent of all these laws is a generalised derivative of a projection, and so symmetric and between zero and the elastic stiffness, at
+apex, edge and kink too.
 """
 
 import numpy as np
 import pytest
 from awkward_states import EDGED, NAMES, kinds, load, yield_strain
-from law_truth import TRUTHS, matrix, projection
+from law_truth import DEV, I6, TRUTHS, matrix, projection, stiffness
 from step_optimality import ELASTIC, EPS, PRINCIPAL, Step
 
 from fenchel.potentials.library import ENTRIES
 
 VISCOUS = ("norton", "perzyna", "bingham", "maxwell", "kelvin_voigt")
-WITH_APEX = "sand sand_k2 reinforced_sand texsol texsol_k2 drucker_prager drucker_prager_cap mobilised_friction mohr_coulomb rankine".split()
+CONES = ["sand", "sand_k2", "reinforced_sand", "texsol", "texsol_k2", "drucker_prager", "mobilised_friction"]
+WITH_APEX = [*CONES, "drucker_prager_cap", "mohr_coulomb", "rankine"]
 LAWS = list(ENTRIES)
 assert set(TRUTHS) == set(ENTRIES)
 
@@ -56,6 +60,7 @@ def judge(name, out, step):
     for what, residual in step.residuals(out.stress).items():
         excess = residual / tolerance
         assert (excess <= 1.0).all(), f"{what}: {worst(excess)}"
+    bound_tangent(out.tangent, step)
     if name in ELASTIC:
         return
     gap, energy = step.gap()
@@ -70,6 +75,19 @@ def judge(name, out, step):
     slack = tolerance * moved + step.trial() * EPS * digits + 1e-14 * energy + 1e-300
     excess = abs(out.dissipation - step.dissipation()) / slack
     assert (excess <= 1.0).all(), f"dissipation: {worst(excess)}"
+
+
+def bound_tangent(tangent, step):
+    """0 ≤ ∂σ/∂ε ≤ stiffness, symmetric."""
+    full = stiffness(float(step.lam), float(step.mu))
+    if step.truth.wires is not None:
+        full = full + stiffness(*step.truth.wires(step.v))
+    if step.name == "kelvin_voigt":
+        full = full + (2 * step.v.eta * DEV + step.v.zeta * np.outer(I6, I6)) / float(step.dt)
+    size = 1e-9 * np.abs(full).max()
+    assert np.abs(tangent - tangent.transpose(0, 2, 1)).max() <= size
+    assert np.linalg.eigvalsh(tangent).min() >= -size
+    assert np.linalg.eigvalsh(full - tangent).min() >= -size
 
 
 def regions(name, step):
