@@ -220,6 +220,22 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
         status[point] = flag
         if flag != 0:
             continue
+        push = gamma[0] * out[1] + out[ip]
+        if pinned and push * weight_q <= zt[0]:
+            # q < 0 was rounding: with a smooth tip (slope zero at q = 0) the minimiser is a small q > 0, not an apex
+            w[0] = weight_q
+            bend = 1.0 + weight_q * out[il]
+            z[0] = (zt[0] - weight_q * push) / bend
+            e[0] = (zt[0] - z[0]) / weight_q
+            pinned, gram = False, 0.0
+            for k in range(n):
+                V[k, 0], V[k, 1] = 0.0, out[1 + k]
+                for l in range(n):
+                    M[k, l] = out[il + n * k + l] * w[l]
+                M[k, k] += 1.0
+            _eliminate(M, n, V, 2)
+            for k in range(n):
+                gram += out[1 + k] * w[k] * V[k, 1]
         inverse = 0.0
         if gamma[0] > 0.0:
             inverse = 1.0 / (gram + result[1]) if soft else 1.0 / gram
