@@ -316,6 +316,15 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
         status[point] = flag
         if flag != 0:
             continue
+        if mo > 0 and kind == 0 and (mask >> m) & 1:
+            push = out[ip]
+            for i in range(m):
+                push += gamma[i] * g[i, 0]
+            if push * W[0, 0] <= zt[0]:
+                # q < 0 was rounding: with a smooth tip (slope zero at q = 0) the minimiser is a small q > 0, not an apex
+                mask -= 1 << m
+                z[0] = (zt[0] - W[0, 0] * push) / (1.0 + W[0, 0] * out[il])
+                e[0] = (zt[0] - z[0]) / W[0, 0]
         active = 0
         for i in range(mt):
             if (mask >> i) & 1 or (i == 0 and soft and gamma[0] > 0.0):
