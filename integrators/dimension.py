@@ -41,21 +41,26 @@ class Dimension:
 
     def strains(self, given: Any) -> Array:
         """Strains (n, size) from what the user gives; relaxed components begin at zero. `InputError` for other shapes and values."""
+        inside = (0, 1, 3) if self.name == "plane_strain" and np.shape(given)[-1:] == (3,) else self.given
+        return self._full("eps_new", given, inside)
+
+    def stresses(self, given: Any) -> Array:
+        """Stresses (n, size) from what the user gives; those that are relaxed are zero."""
+        return self._full("sig_new", given, self.given)
+
+    def _full(self, name: str, given: Any, inside: tuple[int, ...]) -> Array:
         try:
             found = np.atleast_2d(np.asarray(given, dtype=float))
         except (TypeError, ValueError):
-            raise InputError("eps_new must be an array of numbers") from None
+            raise InputError(f"{name} must be an array of numbers") from None
         width = found.shape[-1] if found.ndim == 2 else -1
-        inside = self.given
-        if self.name == "plane_strain" and width == 3:
-            inside = (0, 1, 3)
         if width != len(inside):
             raise InputError(
-                f"eps_new has shape {np.shape(given)}; it must be (n, {len(self.given)}) or ({len(self.given)},), {self.words}"
+                f"{name} has shape {np.shape(given)}; it must be (n, {len(self.given)}) or ({len(self.given)},), {self.words}"
             )
         if not np.isfinite(found).all():
             row = int(np.argmax(~np.isfinite(found).all(axis=1)))
-            raise InputError(f"eps_new holds a value that is not finite (point {row})")
+            raise InputError(f"{name} holds a value that is not finite (point {row})")
         if width == self.size:
             return np.ascontiguousarray(found)
         full = np.zeros((found.shape[0], self.size))

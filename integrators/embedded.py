@@ -58,6 +58,11 @@ class EmbeddedUpdate:
         return str(self.whole.why)
 
     @property
+    def formulation(self) -> str:
+        """What drives the step."""
+        return str(getattr(self.whole, "formulation", "strain"))
+
+    @property
     def layout(self) -> Mapping[str, tuple[int, int]]:
         """Place of each state variable in a packed row."""
         return self.packing.layout
@@ -77,6 +82,8 @@ class EmbeddedUpdate:
     ) -> Any:
         """See `Update.__call__`. Raises `InputError` too where a component that does not exist comes out different from zero."""
         shape = self.dimension
+        if self.formulation == "stress":
+            return self._driven(eps_new, state, dt, certify, values)
         eps = shape.strains(eps_new)
         old = self._widened(self.packing.unpack(self.packing.pack(state, len(eps))))
         if shape.relaxed:
@@ -97,6 +104,22 @@ class EmbeddedUpdate:
             tangent = None if tangent is None else condensed(tangent, shape.given, shape.relaxed)
         found = {k: self._narrowed(v) if v.ndim == 2 and v.shape[1] == 6 else v for k, v in out.state.items()}
         return replace(out, stress=stress, tangent=tangent if self.tangent else None, state=found, strain=eps)
+
+    def _driven(self, given: Any, state: Any, dt: float, certify: bool, values: Mapping[str, Any]) -> Any:
+        """The step from the stresses that are given; those that are relaxed are zero."""
+        shape, inside = self.dimension, list(self.dimension.given)
+        sig = shape.stresses(given)
+        old = self._widened(self.packing.unpack(self.packing.pack(state, len(sig))))
+        out = self.whole(shape.embedded(sig), old, dt, certify=certify, **values)
+        compliance = None if out.tangent is None else self._block(out.tangent)[:, inside][:, :, inside]
+        found = {k: self._narrowed(v) if v.ndim == 2 and v.shape[1] == 6 else v for k, v in out.state.items()}
+        return replace(
+            out,
+            stress=np.ascontiguousarray(sig[:, inside]),
+            tangent=compliance if self.tangent else None,
+            state=found,
+            strain=self._narrowed(out.strain),
+        )
 
     def _widened(self, state: Mapping[str, Array]) -> dict[str, Array]:
         wide = self.whole.layout

@@ -272,7 +272,14 @@ def build_update(
     if formulation == "stress":
         from .stress_update import build_stress_update
 
-        return build_stress_update(law, solver, tangent)
+        if precision != "float64":
+            raise InputError("precision float32 is there for the strain formulation")
+        driven = build_stress_update(law, solver, tangent)
+        if kinds.name == "3d":
+            return driven
+        from .embedded import EmbeddedUpdate
+
+        return EmbeddedUpdate.of(driven, kinds, tangent)
     why = "asked for by name"
     if solver == "auto" or solver in REDUCED:
         try:

@@ -136,6 +136,21 @@ def positive(t):
     return components((vectors * np.maximum(values, 0.0)) @ vectors.T, len(t))
 
 
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("name", ["texsol", "kelvin_voigt"])
+def test_stress_and_strain_drive_the_same_step(name, kind):
+    values, shape = values_of(name), DIMENSIONS[kind]
+    eps = given_strains(np.random.default_rng(8), kind, 40)
+    out = LAWS[name].compile(kind)(eps, None, **values)
+    back = LAWS[name].compile(kind, formulation="stress")(out.stress, None, **values)
+    size = np.abs(out.strain).max(axis=1, keepdims=True)
+    assert (np.abs(back.strain - out.strain) <= 1e-9 * size).all()
+    product = np.einsum("nij,njk->nik", back.tangent, out.tangent)
+    assert product == pytest.approx(np.broadcast_to(np.eye(len(shape.given)), product.shape), abs=1e-6)
+    for key, mine in back.state.items():
+        assert mine == pytest.approx(out.state[key], rel=1e-8, abs=1e-9 * size.max())
+
+
 def test_plane_and_diagonal_spectral_operators_equal_the_matrices():
     rng = np.random.default_rng(3)
     sets = [rng.normal(size=(200, 4)), rng.normal(size=(50, 4)) * [1, 1, 1, 1e-9], np.zeros((1, 4))]
