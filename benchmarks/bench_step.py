@@ -27,7 +27,7 @@ def copied(eps, old):
         np.empty(len(eps), dtype=np.int64),
     )
 
-    @numba.njit
+    @numba.njit(nogil=True)
     def copy(eps, old, stress, new, tangent, loss, status):
         for m in range(eps.shape[0]):
             for i in range(6):
