@@ -105,5 +105,5 @@ def step_pointers(module: ModuleType) -> StepPointers:
             module.coefficients_,
             True,
         )
-    chosen = single_method(plan) if method.endswith("single") else projection_method()
+    chosen = single_method(plan) if method.endswith("single") else projection_method(plan)
     return StepPointers(reduced_step(), chosen, module.functions_, rest, plan, module.coefficients_, False)
