@@ -98,5 +98,5 @@ def step_pointers(module: ModuleType, precision: str = "float64") -> StepPointer
         plan[METHOD_START] = module.SIZE
         chosen = affine_method(int(plan[UNKNOWNS]), int(plan[SURFACES] + plan[ORDERS]))
         return StepPointers(step, chosen, no_law(), rest, plan, module.coefficients_, True)
-    chosen = single_method(plan) if method.endswith("single") else projection_method()
+    chosen = single_method(plan) if method.endswith("single") else projection_method(plan)
     return StepPointers(step, chosen, module.functions_, rest, plan, module.coefficients_, False)

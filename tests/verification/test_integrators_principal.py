@@ -261,3 +261,18 @@ def test_declared_laws_equal_the_general_method(name):
             assert np.abs(one.tangent[i] - found[1]).max() <= 2e-6 * E_0, i
             checked += 1
     assert checked >= 10
+
+
+@pytest.mark.parametrize("name", VALUES)
+def test_a_trial_barely_outside_a_surface_far_from_zero_is_projected(name):
+    """The overshoot is then rounding beside the stress: f is known to so many digits, and what is left of it has to be, not more."""
+    rng = np.random.default_rng(17)
+    eps = principal_strains(rng, 3000, 1, 5)
+    update = LAWS[name].compile()
+    first = update(eps, None, **VALUES[name])
+    for exponent in (-15, -12, -9):
+        near = eps * (1 + 10.0**exponent * rng.normal(size=eps.shape))
+        second = update(near, first.state, **VALUES[name])
+        excess = np.abs(second.stress - first.stress).max(axis=1)
+        trial = (2 * G + K) * np.abs(eps).max(axis=1)
+        assert (excess <= (100 * 10.0**exponent + 1e-13) * trial).all()

@@ -120,6 +120,19 @@ def test_cam_clay_on_the_isotropic_axis():
 # -- programs by hand -------------------------------------------------------------------------------------------------------------
 
 
+def test_shear_stiffness_at_spherical_strains_is_no_matter_of_rounding():
+    """With a deviator of rounding size the answer has q = 0 to rounding, of either sign; the surface is smooth there and has no apex."""
+    rng = np.random.default_rng(23)
+    values, update = given("cam_clay"), LAWS["cam_clay"].compile()
+    volume = 1e-2 * 10 ** rng.uniform(-1, 3, size=(2000, 1)) * rng.choice([-1, 1], size=(2000, 1))
+    out = update(volume * (I6 + 1e-16 * rng.normal(size=(2000, 6))), None, **values)
+    step = 1e-6 * np.abs(volume) * np.eye(6)[4]
+    ahead, behind = (update(volume * I6 + s * step, None, **values).stress for s in (1, -1))
+    shear_modulus = (ahead - behind)[:, 4] / (2e-6 * np.abs(volume[:, 0]))
+    assert shear_modulus.min() > 1e-6 * G
+    assert out.tangent[:, 4, 4] == pytest.approx(shear_modulus, rel=1e-6, abs=1e-9 * G)
+
+
 def dual_program(surfaces):
     """Project the trial stress on {f ≤ 0} in the metric C⁻¹, scalars in 1/H: declared once in stresses of unit size."""
     import cvxpy as cp
