@@ -35,10 +35,12 @@ class BatchSolution:
     residual: Array
     status: NDArray[np.int64]
     counts: NDArray[np.int64]
+    turns: NDArray[np.int64]
+    attempts: NDArray[np.int64]
 
     def take(self, rows: NDArray[np.int64], other: BatchSolution) -> None:
         """Copy the rows of `other` (as many as `rows`) to `rows` here."""
-        for name in ("y", "multipliers", "slopes", "residual", "status", "counts"):
+        for name in ("y", "multipliers", "slopes", "residual", "status", "counts", "turns", "attempts"):
             getattr(self, name)[rows] = getattr(other, name)
         if self.tangent is not None and other.tangent is not None:
             self.tangent[rows] = other.tangent
@@ -58,14 +60,14 @@ def run_engine(
     y = np.zeros((count, n)) if start is None else np.array(start[0], dtype=float)
     multipliers = np.zeros((count, m)) if start is None else np.array(start[1], dtype=float)
     slopes, residual = np.zeros((count, data.shape[1])), np.zeros(count)
-    status, counts = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    status, counts, turns = np.zeros((3, count), dtype=np.int64)
     tangents = np.zeros((count, 6, 6)) if tangent else np.zeros((1, 6, 6))
+    arrays = program.engine_arrays
     solve_points(
-        program.p, program.G, program.q0, program.q1, program.h0, program.h1, program.C, program.c1, *program.cone_arrays(),
-        np.ascontiguousarray(data), start is not None, y, multipliers, slopes, tangents, tangent, residual, status, counts,
+        *arrays, np.ascontiguousarray(data), start is not None, y, multipliers, slopes, tangents, tangent, residual, status, counts, turns,
         tolerance, tau, STEPS,
     )  # fmt: skip
-    return BatchSolution(y, multipliers, slopes, tangents if tangent else None, residual, status, counts)
+    return BatchSolution(y, multipliers, slopes, tangents if tangent else None, residual, status, counts, turns, np.ones(count, dtype=np.int64))
 
 
 def solve_batch(
@@ -112,6 +114,8 @@ def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, m
         other.residual[mask],
         other.status[mask],
         other.counts[mask],
+        other.turns[mask],
+        other.attempts[mask],
     )
     found.take(rows, part)
 
