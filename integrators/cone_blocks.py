@@ -36,73 +36,71 @@ Jacobian = namedtuple("Jacobian", "marks numbers parts raw units work")
 @njit(folder=_FOLDER, nogil=True)
 def project_all(cones, alphas, betas, tau, v, out, jacobian):
     """Π_{K*}(v) cone by cone, the proximal step for scalar terms; keeps what V needs. Returns the sum of the scalar terms."""
+    kinds, starts, sizes = cones.kinds, cones.starts, cones.sizes
+    marks, numbers, units = jacobian.marks, jacobian.numbers, jacobian.units
     total = 0.0
-    for b in range(cones.kinds.size):
-        kind, s, size = cones.kinds[b], cones.starts[b], cones.sizes[b]
+    for b in range(kinds.size):
+        kind, s, size = kinds[b], starts[b], sizes[b]
         if kind == ORTHANT:
-            given, image = v[s : s + size], out[s : s + size]
-            for i in range(size):
-                image[i] = given[i] if given[i] > 0.0 else 0.0
+            for i in range(s, s + size):
+                out[i] = v[i] if v[i] > 0.0 else 0.0
         elif kind == SECOND_ORDER:
-            jacobian.marks[b] = _second_order(v[s : s + size], out[s : s + size], jacobian.units[s : s + size], jacobian.numbers[b])
+            marks[b], numbers[b, 0] = _second_order(v, s, size, out, units)
         elif kind == SEMIDEFINITE:
-            jacobian.marks[b] = semidefinite_parts(v, s, out, jacobian.numbers[b], jacobian.parts[b], jacobian.work)
+            marks[b] = semidefinite_parts(v, s, out, numbers[b], jacobian.parts[b], jacobian.work)
         elif kind >= POWER_TERM:
-            out[s], jacobian.numbers[b, 0], value = proximal_step(kind, alphas[b], betas[b], v[s], tau)
+            out[s], numbers[b, 0], value = proximal_step(kind, alphas[b], betas[b], v[s], tau)
             total += value
         else:
-            jacobian.marks[b] = project(kind, alphas[b], v, s, size, out, jacobian.raw[b], jacobian.work)
+            marks[b] = project(kind, alphas[b], v, s, size, out, jacobian.raw[b], jacobian.work)
     return total
 
 
 @njit(folder=_FOLDER, nogil=True)
-def _second_order(v, out, unit, numbers):
-    """Projection of v = (t, w); with a mixed Jacobian w/|w| in unit[1:] and the third eigenvalue in numbers[0]."""
-    size = v.size
-    t = v[0]
+def _second_order(v, s, size, out, unit):
+    """Projection of v[s : s + size] = (t, w), w/|w| into `unit`; returns (mark, third eigenvalue of a mixed Jacobian)."""
+    t = v[s]
     total = 0.0
-    for i in range(1, size):
+    for i in range(s + 1, s + size):
         total += v[i] * v[i]
     if 1e-200 < total < 1e200:
         length = math.sqrt(total)
     else:
         largest = 0.0
-        for i in range(1, size):
+        for i in range(s + 1, s + size):
             largest = max(largest, abs(v[i]))
         total = 0.0
         if largest > 0.0:
-            for i in range(1, size):
+            for i in range(s + 1, s + size):
                 part = v[i] / largest
                 total += part * part
         length = largest * math.sqrt(total)
     if length <= t:
-        # the tip itself counts as inside where t > 0 only
-        for i in range(size):
+        for i in range(s, s + size):
             out[i] = v[i]
-        return 1 if t > 0.0 else 0
+        # the tip itself counts as outside
+        return (1, 1.0) if t > 0.0 else (0, 0.0)
     if length <= -t:
-        for i in range(size):
+        for i in range(s, s + size):
             out[i] = 0.0
-        return 0
+        return 0, 0.0
     half = 0.5 * (t + length)
-    ratio = half / length
-    out[0] = half
-    inverse = 1.0 / length
-    for i in range(1, size):
+    ratio, inverse = half / length, 1.0 / length
+    out[s] = half
+    for i in range(s + 1, s + size):
         out[i] = ratio * v[i]
         unit[i] = v[i] * inverse
-    numbers[0] = ratio
-    return 2
+    return 2, ratio
 
 
 @njit(folder=_FOLDER, nogil=True)
 def linearise(cones, jacobian):
     """Take the Jacobians of the exponential and power cones apart, after `project_all`."""
     root = 1.4142135623730951
-    for b in range(cones.kinds.size):
-        if SEMIDEFINITE < cones.kinds[b] < POWER_TERM and jacobian.marks[b] == 2:
-            raw, work = jacobian.raw[b], jacobian.work
-            part = work[12:18]
+    kinds, marks, work = cones.kinds, jacobian.marks, jacobian.work
+    for b in range(kinds.size):
+        if SEMIDEFINITE < kinds[b] < POWER_TERM and marks[b] == 2:
+            raw, part = jacobian.raw[b], work[12:18]
             part[0], part[1], part[2] = raw[0, 0], raw[1, 1], raw[2, 2]
             part[3], part[4], part[5] = root * raw[1, 2], root * raw[0, 2], root * raw[0, 1]
             eigen(part, work)
@@ -121,110 +119,103 @@ def _value(mode, e, tau, delta):
 
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
-def add_curvature(cones, jacobian, v, mode, tau, delta, matrix, one, two):
-    """matrix += GᵀF(V)G, upper triangle, F = PENALTY or SLOPE (both vanish at zero); `one`, `two` (n,) are room."""
-    n = matrix.shape[0]
-    full = _value(mode, 1.0, tau, delta)
-    for b in range(cones.kinds.size):
-        kind, s, size = cones.kinds[b], cones.starts[b], cones.sizes[b]
-        rows = cones.G[s : s + size]
-        mark = jacobian.marks[b]
-        if kind == ORTHANT:
-            given = v[s : s + size]
-            for r in range(size):
-                if given[r] > 0.0:
-                    _add_square(matrix, rows[r], full)
-        elif kind >= POWER_TERM:
-            _add_square(matrix, rows[0], _value(mode, jacobian.numbers[b, 0], tau, delta))
-        elif mark == 1:
-            gram = cones.grams[b]
-            for i in range(n):
-                line, add = matrix[i], gram[i]
-                for j in range(i, n):
-                    line[j] += full * add[j]
-            if kind == SECOND_ORDER:
-                _add_square(matrix, rows[0], full)
-        elif mark == 2 and kind == SECOND_ORDER:
-            unit = jacobian.units[s : s + size]
-            gram, first = cones.grams[b], rows[0]
-            for i in range(n):
-                two[i] = 0.0
-            for r in range(1, size):
-                factor, row = unit[r], rows[r]
-                for i in range(n):
-                    two[i] += factor * row[i]
-            for i in range(n):
-                one[i] = first[i] + two[i]
-            third = _value(mode, jacobian.numbers[b, 0], tau, delta)
-            for i in range(n):
-                line, add = matrix[i], gram[i]
-                x, y = 0.5 * full * one[i], third * two[i]
-                for j in range(i, n):
-                    line[j] += third * add[j] + x * one[j] - y * two[j]
-        elif mark == 2:
-            for k in range(size):
-                weight = _value(mode, jacobian.numbers[b, k], tau, delta)
-                if weight != 0.0:
-                    part = jacobian.parts[b, k]
-                    for i in range(n):
-                        one[i] = 0.0
-                    for r in range(size):
-                        factor, row = part[r], rows[r]
-                        for i in range(n):
-                            one[i] += factor * row[i]
-                    _add_square(matrix, one, weight)
+def _add_row(matrix, G, row, weight):
+    """matrix += weight g gᵀ, g a row of G."""
+    for i in range(matrix.shape[0]):
+        x = weight * G[row, i]
+        if x != 0.0:
+            for j in range(i + 1):
+                matrix[i, j] += x * G[row, j]
 
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
-def _add_square(matrix, a, weight):
+def add_curvature(cones, jacobian, v, mode, tau, delta, matrix, one, two):
+    """matrix += GᵀF(V)G, lower triangle, F = PENALTY or SLOPE (both vanish at zero); `one`, `two` (n,) are room."""
     n = matrix.shape[0]
-    for i in range(n):
-        x = weight * a[i]
-        if x != 0.0:
-            line = matrix[i]
-            for j in range(i, n):
-                line[j] += x * a[j]
+    kinds, starts, sizes, G, grams = cones.kinds, cones.starts, cones.sizes, cones.G, cones.grams
+    marks, numbers, parts, units = jacobian.marks, jacobian.numbers, jacobian.parts, jacobian.units
+    full = _value(mode, 1.0, tau, delta)
+    for b in range(kinds.size):
+        kind, s, size, mark = kinds[b], starts[b], sizes[b], marks[b]
+        if kind == ORTHANT:
+            for r in range(s, s + size):
+                if v[r] > 0.0:
+                    _add_row(matrix, G, r, full)
+        elif kind >= POWER_TERM:
+            _add_row(matrix, G, s, _value(mode, numbers[b, 0], tau, delta))
+        elif mark == 1:
+            for i in range(n):
+                for j in range(i + 1):
+                    matrix[i, j] += full * grams[b, i, j]
+            if kind == SECOND_ORDER:
+                _add_row(matrix, G, s, full)
+        elif mark == 2 and kind == SECOND_ORDER:
+            for i in range(n):
+                two[i] = 0.0
+            for r in range(s + 1, s + size):
+                part = units[r]
+                for i in range(n):
+                    two[i] += part * G[r, i]
+            for i in range(n):
+                one[i] = G[s, i] + two[i]
+            third = _value(mode, numbers[b, 0], tau, delta)
+            for i in range(n):
+                x, y = 0.5 * full * one[i], third * two[i]
+                for j in range(i + 1):
+                    matrix[i, j] += third * grams[b, i, j] + x * one[j] - y * two[j]
+        elif mark == 2:
+            for k in range(size):
+                weight = _value(mode, numbers[b, k], tau, delta)
+                if weight != 0.0:
+                    for i in range(n):
+                        one[i] = 0.0
+                    for r in range(size):
+                        part = parts[b, k, r]
+                        for i in range(n):
+                            one[i] += part * G[s + r, i]
+                    for i in range(n):
+                        x = weight * one[i]
+                        if x != 0.0:
+                            for j in range(i + 1):
+                                matrix[i, j] += x * one[j]
 
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
 def apply(cones, jacobian, v, mode, tau, delta, given, out):
     """out = F(V) given."""
+    kinds, starts, sizes = cones.kinds, cones.starts, cones.sizes
+    marks, numbers, parts, units = jacobian.marks, jacobian.numbers, jacobian.parts, jacobian.units
     full, none = _value(mode, 1.0, tau, delta), _value(mode, 0.0, tau, delta)
-    for b in range(cones.kinds.size):
-        kind, s, size = cones.kinds[b], cones.starts[b], cones.sizes[b]
-        a, image = given[s : s + size], out[s : s + size]
-        mark = jacobian.marks[b]
+    for b in range(kinds.size):
+        kind, s, size, mark = kinds[b], starts[b], sizes[b], marks[b]
         if kind == ORTHANT:
-            at = v[s : s + size]
-            for i in range(size):
-                image[i] = (full if at[i] > 0.0 else none) * a[i]
+            for i in range(s, s + size):
+                out[i] = (full if v[i] > 0.0 else none) * given[i]
         elif kind >= POWER_TERM:
-            image[0] = _value(mode, jacobian.numbers[b, 0], tau, delta) * a[0]
+            out[s] = _value(mode, numbers[b, 0], tau, delta) * given[s]
         elif mark < 2:
-            factor = full if mark == 1 else none
-            for i in range(size):
-                image[i] = factor * a[i]
+            weight = full if mark == 1 else none
+            for i in range(s, s + size):
+                out[i] = weight * given[i]
         elif kind == SECOND_ORDER:
-            unit = jacobian.units[s : s + size]
             along = 0.0
-            for i in range(1, size):
-                along += unit[i] * a[i]
-            third = _value(mode, jacobian.numbers[b, 0], tau, delta)
-            up, down = 0.5 * full * (a[0] + along), 0.5 * none * (a[0] - along)
-            image[0] = up + down
+            for i in range(s + 1, s + size):
+                along += units[i] * given[i]
+            third = _value(mode, numbers[b, 0], tau, delta)
+            up, down = 0.5 * full * (given[s] + along), 0.5 * none * (given[s] - along)
+            out[s] = up + down
             rest = up - down - third * along
-            for i in range(1, size):
-                image[i] = third * a[i] + rest * unit[i]
+            for i in range(s + 1, s + size):
+                out[i] = third * given[i] + rest * units[i]
         else:
-            for i in range(size):
-                image[i] = none * a[i]
+            for i in range(s, s + size):
+                out[i] = none * given[i]
             for k in range(size):
-                e = jacobian.numbers[b, k]
+                e = numbers[b, k]
                 if e != 0.0:
-                    part = jacobian.parts[b, k]
                     along = 0.0
                     for i in range(size):
-                        along += part[i] * a[i]
+                        along += parts[b, k, i] * given[s + i]
                     along *= _value(mode, e, tau, delta) - none
                     for i in range(size):
-                        image[i] += along * part[i]
+                        out[s + i] += along * parts[b, k, i]

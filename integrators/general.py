@@ -43,9 +43,9 @@ _EPS = 2.220446049250313e-16
 _DELTA = 1e-8
 _TURNS = 60
 
-# unknowns: y0, trial, slope, direction, kept_y, one, two, diagonal; rows: v, w, image, v_next, kept_l, spread, more
+# unknowns: y0, trial, slope, direction, kept_y, one, two; rows: v, w, image, v_next, kept_l, spread, more
 Room = namedtuple(
-    "Room", "y0 trial slope direction kept_y one two diagonal v w image v_next kept_l spread more matrix"
+    "Room", "y0 trial slope direction kept_y one two v w image v_next kept_l spread more matrix"
 )
 
 
@@ -55,20 +55,20 @@ def _times(Gt, y, out):
     for r in range(out.size):
         out[r] = 0.0
     for j in range(y.size):
-        factor_, row = y[j], Gt[j]
-        if factor_ != 0.0:
+        x = y[j]
+        if x != 0.0:
             for r in range(out.size):
-                out[r] += factor_ * row[r]
+                out[r] += x * Gt[j, r]
 
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
 def _add_transposed(G, w, out):
     """out += Gᵀ w."""
     for r in range(w.size):
-        factor_, row = w[r], G[r]
-        if factor_ != 0.0:
+        x = w[r]
+        if x != 0.0:
             for i in range(out.size):
-                out[i] += factor_ * row[i]
+                out[i] += x * G[r, i]
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -84,12 +84,10 @@ def _largest(a):
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
 def _start_matrix(p, rho, matrix):
-    n = p.size
-    for i in range(n):
-        row = matrix[i]
-        for j in range(i, n):
-            row[j] = 0.0
-        row[i] = p[i] if p[i] >= 0.5 else p[i] + rho
+    for i in range(p.size):
+        for j in range(i):
+            matrix[i, j] = 0.0
+        matrix[i, i] = p[i] if p[i] >= 0.5 else p[i] + rho
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -134,7 +132,7 @@ def _kkt_factor(p, cones, v, room, jacobian):
     linearise(cones, jacobian)
     _start_matrix(p, _DELTA, room.matrix)
     add_curvature(cones, jacobian, v, SLOPE, 1.0, _DELTA, room.matrix, room.one, room.two)
-    factor(room.matrix, room.diagonal)
+    factor(room.matrix)
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -223,7 +221,7 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
             linearise(cones, jacobian)
             _start_matrix(p, rho, room.matrix)
             add_curvature(cones, jacobian, v, PENALTY, tau, 0.0, room.matrix, room.one, room.two)
-            factor(room.matrix, room.diagonal)
+            factor(room.matrix)
             for i in range(n):
                 direction[i] = -slope[i]
             substitute(room.matrix, direction)
@@ -381,7 +379,7 @@ def solve_points(
         np.zeros(m), np.zeros(60),
     )  # fmt: skip
     room = Room(
-        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n),
+        np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n),
         np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros((n, n)),
     )  # fmt: skip
     shapes, scales = np.zeros(blocks), np.zeros(blocks)
@@ -392,20 +390,19 @@ def solve_points(
         if _largest(h1t[k]) > 0.0:
             h1_zero = False
     for point in range(data.shape[0]):
-        d = data[point]
         for i in range(n):
             q[i] = q0[i]
         for r in range(m):
             h[r] = h0[r]
         for k in range(width):
-            number, row = d[k], q1t[k]
+            number = data[point, k]
             for i in range(n):
-                q[i] += number * row[i]
+                q[i] += number * q1t[k, i]
         if not h1_zero:
             for k in range(width):
-                number, row = d[k], h1t[k]
+                number = data[point, k]
                 for r in range(m):
-                    h[r] += number * row[r]
+                    h[r] += number * h1t[k, r]
         scale = max(_largest(q), _largest(h))
         if not scale < math.inf:
             statuses[point] = NOT_FINITE
@@ -424,9 +421,9 @@ def solve_points(
             lam[r] = l_all[point, r] / scale if warm else 0.0
         if not warm:
             for i in range(n):
-                number, row = q[i], guess[i]
+                number = q[i]
                 for r in range(m):
-                    lam[r] += number * row[r]
+                    lam[r] += number * guess[i, r]
         status, residual, count, turn = _solve_point(
             p, cones, q, h, shapes, scales, y, lam, tolerance, tau_start, limit, room, jacobian
         )
@@ -438,10 +435,9 @@ def solve_points(
         for k in range(width):
             value = c1[k]
             for j in range(width):
-                value += C[k, j] * d[j]
-            row, found = q1t[k], y_all[point]
+                value += C[k, j] * data[point, j]
             for i in range(n):
-                value += row[i] * found[i]
+                value += q1t[k, i] * y_all[point, i]
             if not h1_zero:
                 for r in range(m):
                     value -= h1t[k, r] * l_all[point, r]
