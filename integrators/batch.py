@@ -123,7 +123,7 @@ def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, m
 def interior_start(program: StepProgram, data: Array) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
     """clarabel's answers as a start of the compact form, and where it says infeasible."""
     y, multipliers, infeasible = run_interior(program, data)
-    return (y[:, program.compact.unknowns], multipliers[:, program.compact.rows]), infeasible
+    return program.compact.start(y, multipliers), infeasible
 
 
 def slopes_of(program: StepProgram, data: Array, y: Array, multipliers: Array) -> Array:
