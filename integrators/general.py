@@ -160,10 +160,11 @@ def _finish(p, cones, q, h, y, lam, alphas, betas, tolerance, room, jacobian):
     n, m = p.size, h.size
     residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
     for steps in range(12):
-        if residual <= tolerance * min(scale, 1.0):
+        # one step more than the tolerance asks for leaves rounding alone
+        if residual <= 0.01 * tolerance * min(scale, 1.0):
             return CONVERGED, residual, steps
-        if residual <= 8.0 * _EPS * (1.0 + scale):
-            return ROUNDING, residual, steps
+        if residual <= 4.0 * _EPS * (1.0 + scale):
+            return (CONVERGED if residual <= tolerance * min(scale, 1.0) else ROUNDING), residual, steps
         _kkt_factor(p, cones, room.v, room, jacobian)
         _kkt_step(cones, room.v, room.slope, room.more, room.direction, room.v_next, room, jacobian)
         for i in range(n):
@@ -181,9 +182,9 @@ def _finish(p, cones, q, h, y, lam, alphas, betas, tolerance, room, jacobian):
                 for r in range(m):
                     lam[r] = room.kept_l[r]
                 residual, scale = before, scale_before
-            if residual <= 64.0 * _EPS * (1.0 + scale):
-                return ROUNDING, residual, steps + 1
-            return ITERATION_LIMIT, residual, steps + 1
+            if residual <= tolerance * min(scale, 1.0):
+                return CONVERGED, residual, steps + 1
+            return (ROUNDING if residual <= 64.0 * _EPS * (1.0 + scale) else ITERATION_LIMIT), residual, steps + 1
     return ITERATION_LIMIT, residual, 12
 
 
@@ -196,7 +197,7 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
     )  # fmt: skip
     # where the start is the solution (an elastic point)
     residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
-    if residual <= tolerance * min(scale, 1.0):
+    if residual <= 0.01 * tolerance * min(scale, 1.0) or residual <= 4.0 * _EPS * (1.0 + scale):
         return CONVERGED, residual, 0, 0
     steps, stalled = 0, 0
     best = math.inf
@@ -264,7 +265,7 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
         residual = max(stationary, feasible)
         if not residual < math.inf:
             return NOT_FINITE, residual, steps, turn
-        if residual <= tolerance * min(scale, 1.0):
+        if residual <= 0.01 * tolerance * min(scale, 1.0):
             return CONVERGED, residual, steps, turn
         if residual <= 8.0 * _EPS * (1.0 + scale) or (stalled >= 3 and best <= 64.0 * _EPS * (1.0 + scale)):
             return ROUNDING, residual, steps, turn
@@ -274,6 +275,9 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
             if status != ITERATION_LIMIT:
                 return status, found, steps, turn
             try_below = 0.1 * residual
+            residual = min(residual, found)
+        if residual <= tolerance * min(scale, 1.0):
+            return CONVERGED, residual, steps, turn
         stalled = stalled + 1 if residual > 0.5 * best else 0
         if stalled > 8:
             return ITERATION_LIMIT, residual, steps, turn
@@ -310,46 +314,48 @@ def _at_rest(cones, y, h1_zero, v, jacobian):
 
 
 @njit(folder=_FOLDER, nogil=True)
-def _tangent(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room, jacobian, out):
-    """∂²W/∂ε² = C + q₁ᵀ dy/dε − h₁ᵀ dλ/dε, (dy, dλ) the derivative of the natural map's zero."""
+def _derivatives(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room, jacobian, out):
+    """∂²W/∂ε² = C + q₁ᵀ dy/dε − h₁ᵀ dλ/dε, (dy, dλ) the derivative of the natural map's zero. Returns the relative residual left."""
     n, m = dy.size, dl.size
     _kkt_factor(p, cones, v, room, jacobian)
     first, second = room.slope, room.more
+    worst = 0.0
     for c in range(6):
         goal = max(_largest(q1t[c]), _largest(h1t[c]), 1e-300)
         for i in range(n):
             dy[i] = 0.0
+            first[i] = -q1t[c, i]
         for r in range(m):
             dl[r] = 0.0
+            second[r] = -h1t[c, r]
+        if not h1_zero:
+            apply(cones, jacobian, v, PENALTY, 1.0, 0.0, second, room.image)
+            for r in range(m):
+                second[r] = room.image[r]
         last = math.inf
-        for turn in range(20):
-            for i in range(n):
-                first[i] = -q1t[c, i] - p[i] * dy[i]
-            if turn == 0 and h1_zero:
-                for r in range(m):
-                    second[r] = 0.0
-            else:
-                # V(dλ + G dy − h₁) − dλ
-                for i in range(n):
-                    room.direction[i] = 0.0
-                _add_transposed(cones.G, dl, room.direction)
-                for i in range(n):
-                    first[i] -= room.direction[i]
-                _times(cones.Gt, dy, room.image)
-                for r in range(m):
-                    room.image[r] += dl[r] - h1t[c, r]
-                apply(cones, jacobian, v, PENALTY, 1.0, 0.0, room.image, second)
-                for r in range(m):
-                    second[r] -= dl[r]
-                size = max(_largest(first), _largest(second))
-                if size <= 1e-14 * goal or not size < 0.5 * last:
-                    break
-                last = size
+        for _ in range(20):
             _kkt_step(cones, v, first, second, step_y, step_l, room, jacobian)
             for i in range(n):
                 dy[i] += step_y[i]
             for r in range(m):
                 dl[r] += step_l[r]
+            # what is left: −q₁ − p dy − Gᵀdλ, and V(dλ + G dy − h₁) − dλ
+            for i in range(n):
+                first[i] = 0.0
+            _add_transposed(cones.G, dl, first)
+            for i in range(n):
+                first[i] = -q1t[c, i] - p[i] * dy[i] - first[i]
+            _times(cones.Gt, dy, room.image)
+            for r in range(m):
+                room.image[r] += dl[r] - h1t[c, r]
+            apply(cones, jacobian, v, PENALTY, 1.0, 0.0, room.image, second)
+            for r in range(m):
+                second[r] -= dl[r]
+            size = max(_largest(first), _largest(second))
+            if size <= 1e-14 * goal or not size < 0.5 * last:
+                break
+            last = size
+        worst = max(worst, min(size, last) / goal)
         for i in range(6):
             value = C[i, c]
             for k in range(n):
@@ -358,6 +364,51 @@ def _tangent(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room, ja
                 for r in range(m):
                     value -= h1t[i, r] * dl[r]
             out[i, c] = value
+    return worst
+
+
+@njit(folder=_FOLDER, nogil=True)
+def _shifted(cones, h1t, v, shift, everywhere, out):
+    """out = v less `shift` times the unit of each cone, of those whose right sides move with the data, or of all.
+
+    Where multiplier and slack both vanish to rounding, V is noise; with data in h its choice may contradict itself.
+    """
+    for r in range(v.size):
+        out[r] = v[r]
+    for b in range(cones.kinds.size):
+        kind, s, size = cones.kinds[b], cones.starts[b], cones.sizes[b]
+        moved = everywhere
+        for k in range(h1t.shape[0]):
+            for r in range(s, s + size):
+                if h1t[k, r] != 0.0:
+                    moved = True
+        if moved and kind <= SEMIDEFINITE:
+            count = size if kind == ORTHANT else (3 if kind == SEMIDEFINITE else 1)
+            for r in range(s, s + count):
+                out[r] -= shift
+
+
+@njit(folder=_FOLDER, nogil=True)
+def _tangent(
+    p, cones, q, h, y, lam, alphas, betas, q1t, h1t, h1_zero, C, dy, dl, step_y, step_l, v, room, jacobian, out,
+):  # fmt: skip
+    """Tangent at a solution; `v` (m,) is room."""
+    _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
+    if _at_rest(cones, y, h1_zero, room.v, jacobian):
+        for i in range(6):
+            for c in range(6):
+                out[i, c] = C[i, c]
+        return
+    for r in range(v.size):
+        v[r] = room.v[r]
+    scale = max(_largest(lam), _largest(y))
+    for attempt in range(3):
+        if attempt > 0 or not h1_zero:
+            _shifted(cones, h1t, room.v, scale * (1e-14 if attempt == 0 else 1e-12 if attempt == 1 else 1e-9), attempt > 0, v)
+            project_all(cones, alphas, betas, 1.0, v, room.w, jacobian)
+        worst = _derivatives(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room, jacobian, out)
+        if worst <= 1e-8:
+            return
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -384,7 +435,7 @@ def solve_points(
     )  # fmt: skip
     shapes, scales = np.zeros(blocks), np.zeros(blocks)
     y, q, dy, step_y = np.zeros(n), np.zeros(n), np.zeros(n), np.zeros(n)
-    lam, h, dl, step_l = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
+    lam, h, dl, step_l, place = np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m), np.zeros(m)
     h1_zero = True
     for k in range(width):
         if _largest(h1t[k]) > 0.0:
@@ -443,16 +494,7 @@ def solve_points(
                     value -= h1t[k, r] * l_all[point, r]
             slopes[point, k] = value
         if want_tangent:
-            _natural(p, cones, q, h, y, lam, shapes, scales, room, jacobian)
-            out = tangents[point]
-            if _at_rest(cones, y, h1_zero, room.v, jacobian):
-                for i in range(6):
-                    for c in range(6):
-                        out[i, c] = C[i, c]
-            else:
-                # v moves while the tangent is made
-                for r in range(m):
-                    room.v_next[r] = room.v[r]
-                _tangent(
-                    p, cones, q1t, h1t, h1_zero, C, room.v_next, dy, dl, step_y, step_l, room, jacobian, out
-                )  # fmt: skip
+            _tangent(
+                p, cones, q, h, y, lam, shapes, scales, q1t, h1t, h1_zero, C, dy, dl, step_y, step_l, place, room, jacobian,
+                tangents[point],
+            )  # fmt: skip
