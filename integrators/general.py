@@ -401,10 +401,11 @@ def _tangent(
         return
     for r in range(v.size):
         v[r] = room.v[r]
-    scale = max(_largest(lam), _largest(y))
+    scale, shift = max(_largest(lam), _largest(y), 1.0), 1e-12
     for attempt in range(3):
         if attempt > 0 or not h1_zero:
-            _shifted(cones, h1t, room.v, scale * (1e-14 if attempt == 0 else 1e-12 if attempt == 1 else 1e-9), attempt > 0, v)
+            _shifted(cones, h1t, room.v, scale * shift, attempt > 0, v)
+            shift *= 100.0
             project_all(cones, alphas, betas, 1.0, v, room.w, jacobian)
         worst = _derivatives(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room, jacobian, out)
         if worst <= 1e-8:
