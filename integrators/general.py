@@ -29,7 +29,7 @@ from ..cache import njit
 from .cone_blocks import PENALTY, SLOPE, SPREAD, Cones, Jacobian, add_curvature, apply, linearise, project_all
 from .cone_projection import ORTHANT, SEMIDEFINITE
 from .key import files_hash
-from .scalar_terms import POWER_TERM, scaled_term
+from .scalar_terms import POWER_TERM, proximal_step, scaled_term
 from .small_cholesky import FAST, factor, substitute
 
 __all__ = ["CONVERGED", "ITERATION_LIMIT", "NOT_FINITE", "ROUNDING", "solve_points"]
@@ -109,7 +109,7 @@ def _level(p, cones, q, y, v, rho, tau, alphas, betas, room, jacobian):
 
 
 @njit(folder=_FOLDER, nogil=True)
-def _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian):
+def _natural(p, cones, q, h, y, lam, alphas, betas, steep, room, jacobian):
     """Natural map at (y, λ): −(py + q + Gᵀλ) in `slope`, Π(v) − λ in `more`, v = λ + Gy − h. Returns (its largest entry, scale)."""
     v, w, slope, more = room.v, room.w, room.slope, room.more
     _times(cones.Gt, y, v)
@@ -118,12 +118,42 @@ def _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian):
     project_all(cones, alphas, betas, 1.0, v, w, jacobian)
     for r in range(v.size):
         more[r] = w[r] - lam[r]
+    for b in range(cones.kinds.size if steep else 0):
+        if cones.kinds[b] == POWER_TERM and betas[b] < 2.0:
+            r = cones.starts[b]
+            more[r], jacobian.numbers[b, 0] = _steep_power(alphas[b], betas[b], lam[r], lam[r] - v[r])
     for i in range(p.size):
         slope[i] = p[i] * y[i] + q[i]
     _add_transposed(cones.G, lam, slope)
     for i in range(p.size):
         slope[i] = -slope[i]
     return max(_largest(slope), _largest(more)), max(_largest(lam), _largest(y))
+
+
+@njit(folder=_FOLDER, nogil=True)
+def _steep_power(c, k, lam, s):
+    """Row of the natural map for C|s|ᵏ, k < 2, with a penalty t of its own: (residual, e), both as they read at t = 1.
+
+    The slope of λ = −g′(s) has no bound at zero. With t above g″ Newton's method follows s, which finds that corner in one step, where
+    following λ halves the distance at best; the equation (1 − e) dλ − e t G dy = w − λ is then brought to t = 1.
+    """
+    bend = 0.0
+    if lam != 0.0:
+        bend = (k - 1.0) * abs(lam) * (abs(lam) / (c * k)) ** (-1.0 / (k - 1.0))
+    if s != 0.0:
+        bend = max(bend, c * k * (k - 1.0) * abs(s) ** (k - 2.0))
+    t = min(max(100.0 * bend, 1.0), 1e12)
+    w, e, _ = proximal_step(POWER_TERM, c, k, lam - t * s, t)
+    bend = t * e / (1.0 - e)
+    return (w - lam) * (1.0 + bend / t) / (1.0 + bend), bend / (1.0 + bend)
+
+
+@njit(folder=_FOLDER, nogil=True)
+def _has_steep(cones, betas):
+    for b in range(cones.kinds.size):
+        if cones.kinds[b] == POWER_TERM and betas[b] < 2.0:
+            return True
+    return False
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -153,13 +183,13 @@ def _kkt_step(cones, v, first, second, dy, dl, room, jacobian):
 
 @njit(folder=_FOLDER, nogil=True)
 def _finish(p, cones, q, h, y, lam, alphas, betas, tolerance, room, jacobian):
-    """Newton's method for the natural map from (y, λ), in place, while each step divides the residual by four.
-
-    Returns (status, residual, steps); where it stops short, (y, λ) are the best met.
+    """Newton's method for the natural map from (y, λ), in place, while each step divides the residual by four; then, where there are powers
+    below two, once more with `_steep_power`. Returns (status, residual, steps); where it stops short, (y, λ) are the best met.
     """
     n, m = p.size, h.size
-    residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
-    for steps in range(12):
+    steep = False
+    residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, steep, room, jacobian)
+    for steps in range(16):
         # one step more than the tolerance asks for leaves rounding alone
         if residual <= 0.01 * tolerance * min(scale, 1.0):
             return CONVERGED, residual, steps
@@ -174,7 +204,7 @@ def _finish(p, cones, q, h, y, lam, alphas, betas, tolerance, room, jacobian):
             room.kept_l[r] = lam[r]
             lam[r] += room.v_next[r]
         before, scale_before = residual, scale
-        residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
+        residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, steep, room, jacobian)
         if not residual <= 0.25 * before:
             if not residual < before:
                 for i in range(n):
@@ -184,8 +214,12 @@ def _finish(p, cones, q, h, y, lam, alphas, betas, tolerance, room, jacobian):
                 residual, scale = before, scale_before
             if residual <= tolerance * min(scale, 1.0):
                 return CONVERGED, residual, steps + 1
+            if not steep and _has_steep(cones, betas):
+                steep = True
+                residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, steep, room, jacobian)
+                continue
             return (ROUNDING if residual <= 64.0 * _EPS * (1.0 + scale) else ITERATION_LIMIT), residual, steps + 1
-    return ITERATION_LIMIT, residual, 12
+    return ITERATION_LIMIT, residual, 16
 
 
 @njit(folder=_FOLDER, nogil=True)
@@ -196,7 +230,7 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
         room.y0, room.trial, room.v, room.w, room.slope, room.direction, room.image,
     )  # fmt: skip
     # where the start is the solution (an elastic point)
-    residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
+    residual, scale = _natural(p, cones, q, h, y, lam, alphas, betas, False, room, jacobian)
     if residual <= 0.01 * tolerance * min(scale, 1.0) or residual <= 4.0 * _EPS * (1.0 + scale):
         return CONVERGED, residual, 0, 0
     steps, stalled = 0, 0
@@ -393,7 +427,7 @@ def _tangent(
     p, cones, q, h, y, lam, alphas, betas, q1t, h1t, h1_zero, C, dy, dl, step_y, step_l, v, room, jacobian, out,
 ):  # fmt: skip
     """Tangent at a solution; `v` (m,) is room."""
-    _natural(p, cones, q, h, y, lam, alphas, betas, room, jacobian)
+    _natural(p, cones, q, h, y, lam, alphas, betas, True, room, jacobian)
     if _at_rest(cones, y, h1_zero, room.v, jacobian):
         for i in range(6):
             for c in range(6):
