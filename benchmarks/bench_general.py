@@ -225,14 +225,13 @@ def main() -> None:
     for name in given.names:
         run, engine = runner(name, given.points, given.threads)
         found = engine(run(True))
-        flows = np.abs(found.multipliers).max(axis=1, initial=0.0) > 0.0
+        flows = np.abs(found.y).max(axis=1, initial=0.0) > 1e-13 * np.abs(found.multipliers).max(axis=1, initial=1.0)
         with_tangent, without = seconds(lambda: run(True), clock), seconds(lambda: run(False), clock)  # noqa: B023
-        turns = f"turns {found.turns.mean():5.2f}  again {100 * (found.attempts > 1).mean():6.3f} %" if hasattr(found, "turns") else ""
         print(
             f"{name:18s} unknowns {found.y.shape[1]:2d} rows {found.multipliers.shape[1]:2d}  "
             f"with tangent {given.points / with_tangent / 1e3:7.1f} k/s  without {given.points / without / 1e3:7.1f} k/s  "
-            f"active {flows.mean():.2f}  newton {found.counts.mean():5.2f} (most {found.counts.max()})  {turns}"
-            f"  failed {(found.status > 1).sum()}  residual {found.residual.max():.0e}"
+            f"flowing {flows.mean():.2f}  newton {found.counts.mean():5.2f} (most {found.counts.max()})  "
+            f"turns {found.turns.mean():4.2f}  again {100 * (found.attempts > 1).mean():.3f} %  failed {(found.status > 1).sum()}  residual {found.residual.max():.0e}"
         )
 
 

@@ -30,7 +30,8 @@ KEPT = 8
 
 @dataclass(frozen=True)
 class GeneralUpdate:
-    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast)."""
+    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast); the engine
+    takes its points in `threads`, which does not change an answer."""
 
     law: Law
     packing: StatePacking
@@ -38,12 +39,20 @@ class GeneralUpdate:
     tangent: bool = True
     solver: str = "general"
     why: str = ""
+    threads: int = 1
     _steps: dict[Any, GeneralStep] = field(default_factory=dict, compare=False, repr=False)
 
+    def __post_init__(self) -> None:
+        if self.threads < 1:
+            raise InputError(f"threads = {self.threads}: the number of threads must be at least 1")
+
     @classmethod
-    def of(cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "") -> GeneralUpdate:
+    def of(
+        cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "", threads: int = 1
+    ) -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
-        found = cls(law, StatePacking.of(law), declared_step(law, whole=solver != "general"), tangent, solver, why)
+        declared = declared_step(law, whole=solver != "general")
+        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, threads)
         found._rehearse()
         return found
 
@@ -130,7 +139,7 @@ class GeneralUpdate:
 
             return reference(step, eps, old, temperature)
         method = "conic" if self.solver == "conic" else "general"
-        return step.solve(eps, old, temperature, tangent=wanted, method=method, start=start)
+        return step.solve(eps, old, temperature, tangent=wanted, method=method, start=start, threads=self.threads)
 
     def outcome(self, eps: Array, old: Array, found: StepSolution) -> tuple[Array, Array]:
         """(packed new state, dissipation of the step [J/m³])."""
