@@ -14,19 +14,25 @@ from numpy.typing import NDArray
 
 from .cone_projection import EXPONENTIAL, EXPONENTIAL_DUAL, ORTHANT, POWER, POWER_DUAL, SECOND_ORDER, SEMIDEFINITE
 from .general import ITERATION_LIMIT, ROUNDING, solve_points
+from .scalar_terms import POWER_TERM
 from .step_program import StepProgram
 
 __all__ = ["INFEASIBLE", "BatchSolution", "interior_start", "run_engine", "run_interior", "slopes_of", "solve_batch"]
 
 Array = NDArray[np.float64]
 INFEASIBLE = 9
-TAU = 10.0
+# penalties to begin with: of cones alone, and where there are scalar terms, which only a stiff one sees; then those of further attempts
+TAU, TERM_TAU = 100.0, 1e4
+OTHER_TAUS = (10.0, 0.3, 1e3)
 STEPS = 60
+# rows that a thread takes at a time: enough to forget the call, few enough to share the work evenly
+CHUNK = 256
 
 
 @dataclass
 class BatchSolution:
-    """Unknowns `y` (N, n), `multipliers` (N, m), `slopes` ∂W/∂d (N, D), `tangent` (N, 6, 6) or None, relative `residual`, codes."""
+    """Unknowns `y` (N, n), `multipliers` (N, m), `slopes` ∂W/∂d (N, D), `tangent` (N, 6, 6) or None, relative `residual`, codes `status`;
+    Newton steps `counts` and outer `turns` of the attempt that is kept, and how many `attempts` were made."""
 
     y: Array
     multipliers: Array
@@ -35,10 +41,12 @@ class BatchSolution:
     residual: Array
     status: NDArray[np.int64]
     counts: NDArray[np.int64]
+    turns: NDArray[np.int64]
+    attempts: NDArray[np.int64]
 
     def take(self, rows: NDArray[np.int64], other: BatchSolution) -> None:
         """Copy the rows of `other` (as many as `rows`) to `rows` here."""
-        for name in ("y", "multipliers", "slopes", "residual", "status", "counts"):
+        for name in ("y", "multipliers", "slopes", "residual", "status", "counts", "turns"):
             getattr(self, name)[rows] = getattr(other, name)
         if self.tangent is not None and other.tangent is not None:
             self.tangent[rows] = other.tangent
@@ -51,21 +59,39 @@ def run_engine(
     tangent: bool = True,
     tolerance: float = 1e-13,
     start: tuple[Array, Array] | None = None,
-    tau: float = TAU,
+    tau: float | None = None,
+    threads: int = 1,
 ) -> BatchSolution:
-    """The engine from zero, or from `start` = (y, multipliers)."""
+    """The engine from the program's own guess, or from `start` = (y, multipliers); `tau` the first penalty.
+
+    Points know nothing of each other: the answer does not depend on `threads`, to the last bit.
+    """
     count, n, m = len(data), program.p.size, program.h0.size
     y = np.zeros((count, n)) if start is None else np.array(start[0], dtype=float)
     multipliers = np.zeros((count, m)) if start is None else np.array(start[1], dtype=float)
     slopes, residual = np.zeros((count, data.shape[1])), np.zeros(count)
-    status, counts = np.zeros(count, dtype=np.int64), np.zeros(count, dtype=np.int64)
+    status, counts, turns = np.zeros((3, count), dtype=np.int64)
     tangents = np.zeros((count, 6, 6)) if tangent else np.zeros((1, 6, 6))
-    solve_points(
-        program.p, program.G, program.q0, program.q1, program.h0, program.h1, program.C, program.c1, *program.cone_arrays(),
-        np.ascontiguousarray(data), start is not None, y, multipliers, slopes, tangents, tangent, residual, status, counts,
-        tolerance, tau, STEPS,
-    )  # fmt: skip
-    return BatchSolution(y, multipliers, slopes, tangents if tangent else None, residual, status, counts)
+    if tau is None:
+        tau = TERM_TAU if any(cone.kind >= POWER_TERM for cone in program.cones) else TAU
+    arrays, data = program.engine_arrays, np.ascontiguousarray(data)
+
+    def run(rows: slice) -> None:
+        solve_points(
+            *arrays, data[rows], start is not None, y[rows], multipliers[rows], slopes[rows],
+            tangents[rows] if tangent else tangents, tangent, residual[rows], status[rows], counts[rows], turns[rows],
+            tolerance, tau, STEPS,
+        )  # fmt: skip
+
+    if threads == 1 or count <= CHUNK:
+        run(slice(0, count))
+    else:
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(run, [slice(a, min(a + CHUNK, count)) for a in range(0, count, CHUNK)]))
+    found = tangents if tangent else None
+    return BatchSolution(y, multipliers, slopes, found, residual, status, counts, turns, np.ones(count, dtype=np.int64))
 
 
 def solve_batch(
@@ -75,32 +101,37 @@ def solve_batch(
     tangent: bool = True,
     tolerance: float = 1e-13,
     start: tuple[Array, Array] | None = None,
+    threads: int = 1,
 ) -> BatchSolution:
     """The engine on the compact form of `program`; points where it stops short again with other penalties, then from clarabel's answer.
 
     Unknowns and multipliers, also those of `start`, are those of the compact form.
     """
     small = program.compact.program
-    found = run_engine(small, data, tangent=tangent, tolerance=tolerance, start=start)
-    for tau in (100.0, 0.3, 1e3):
+    found = run_engine(small, data, tangent=tangent, tolerance=tolerance, start=start, threads=threads)
+    for tau in OTHER_TAUS:
         left = np.flatnonzero(found.status > ROUNDING)
         if left.size == 0:
             return found
-        again = run_engine(small, data[left], tangent=tangent, tolerance=tolerance, tau=tau)
-        better = (again.status <= ROUNDING) | (again.residual < found.residual[left])
-        _take(found, left[better], again, better)
+        _again(found, left, small, data, tangent=tangent, tolerance=tolerance, tau=tau, threads=threads)
     left = np.flatnonzero(found.status > ROUNDING)
     if left.size:
         begin, infeasible = interior_start(program, data[left])
-        again = run_engine(small, data[left], tangent=tangent, tolerance=tolerance, start=begin, tau=1e3)
-        better = (again.status <= ROUNDING) | (again.residual < found.residual[left])
-        _take(found, left[better], again, better)
+        _again(found, left, small, data, tangent=tangent, tolerance=tolerance, start=begin, tau=1e3, threads=threads)
         failed = infeasible & (found.status[left] > ROUNDING)
         found.status[left[failed]] = INFEASIBLE
         # a residual at the level of the last digits of large data is an answer, though not to the asked tolerance
         near = (found.status[left] == ITERATION_LIMIT) & (found.residual[left] <= 1e-10)
         found.status[left[near]] = ROUNDING
     return found
+
+
+def _again(found: BatchSolution, left: NDArray[np.int64], program: StepProgram, data: Array, **options: Any) -> None:
+    """Another attempt at the rows `left`, kept where it is better."""
+    again = run_engine(program, data[left], **options)
+    better = (again.status <= ROUNDING) | (again.residual < found.residual[left])
+    found.attempts[left] += 1
+    _take(found, left[better], again, better)
 
 
 def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, mask: NDArray[np.bool_]) -> None:
@@ -112,6 +143,8 @@ def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, m
         other.residual[mask],
         other.status[mask],
         other.counts[mask],
+        other.turns[mask],
+        other.attempts[mask],
     )
     found.take(rows, part)
 
@@ -119,7 +152,7 @@ def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, m
 def interior_start(program: StepProgram, data: Array) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
     """clarabel's answers as a start of the compact form, and where it says infeasible."""
     y, multipliers, infeasible = run_interior(program, data)
-    return (y[:, program.compact.unknowns], multipliers[:, program.compact.rows]), infeasible
+    return program.compact.start(y, multipliers), infeasible
 
 
 def slopes_of(program: StepProgram, data: Array, y: Array, multipliers: Array) -> Array:

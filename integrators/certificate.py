@@ -149,7 +149,7 @@ def dual_projection(program: StepProgram, v: Array) -> Array:
             values, vectors = decompose(part)
             out[:, rows] = from_matrix(np.einsum("nik,nk,njk->nij", vectors, np.maximum(values, 0.0), vectors))
         elif cone.kind < POWER_TERM:
-            jacobian, work = np.zeros((6, 6)), np.zeros(24)
+            jacobian, work = np.zeros((6, 6)), np.zeros(60)
             for row in range(len(v)):
                 taken = np.ascontiguousarray(part[row])
                 project(cone.kind, cone.alpha, taken, 0, 3, taken, jacobian, work)

@@ -75,8 +75,12 @@ def second_order(v, start, size, out, jacobian):
 
 
 @njit(folder=_FOLDER)
-def semidefinite(v, start, out, jacobian, work):
-    """Projection on the positive semidefinite tensors; `work` holds at least 12 + 6 entries. Returns 0, 1 or 2 as `second_order`."""
+def semidefinite_parts(v, start, out, thetas, parts, work):
+    """Projection on the positive semidefinite tensors with its Jacobian Σ θ_k P_k P_kᵀ, P_k orthonormal in Mandel components.
+
+    The six θ_k go to `thetas`, the P_k to the rows of `parts` (6, 6), those with θ_k = 0 left out of account; `work` holds at least 12 + 6
+    entries. Returns 0, 1 or 2 as `second_order`, the parts being set only with 2.
+    """
     root = 1.4142135623730951
     part = work[12:18]
     for i in range(6):
@@ -94,34 +98,48 @@ def semidefinite(v, start, out, jacobian, work):
         out[start + i] = 0.0
     if count == 0:
         return 0
-    for i in range(6):
-        for j in range(6):
-            jacobian[i, j] = 0.0
+    place = 0
     for k in range(3):
         for m in range(k + 1):
             a, b = work[k], work[m]
-            if a > 0.0 and b > 0.0:
-                theta = 1.0
-            elif a <= 0.0 and b <= 0.0:
-                continue
-            else:
-                theta = a / (a - b) if a > 0.0 else b / (b - a)
-            xk, yk, zk = work[3 + k], work[6 + k], work[9 + k]
-            xm, ym, zm = work[3 + m], work[6 + m], work[9 + m]
-            # Mandel components of sym(n_k ⊗ n_m) of unit norm
-            scale = 1.0 if k == m else root
-            part[0], part[1], part[2] = scale * xk * xm, scale * yk * ym, scale * zk * zm
-            half = 0.5 * root * scale
-            part[3] = half * (yk * zm + zk * ym)
-            part[4] = half * (xk * zm + zk * xm)
-            part[5] = half * (xk * ym + yk * xm)
-            for i in range(6):
-                for j in range(6):
-                    jacobian[i, j] += theta * part[i] * part[j]
-            if k == m:
-                for i in range(6):
-                    out[start + i] += a * part[i]
+            thetas[place] = 0.0
+            if a > 0.0 or b > 0.0:
+                if a > 0.0 and b > 0.0:
+                    thetas[place] = 1.0
+                else:
+                    thetas[place] = a / (a - b) if a > 0.0 else b / (b - a)
+                xk, yk, zk = work[3 + k], work[6 + k], work[9 + k]
+                xm, ym, zm = work[3 + m], work[6 + m], work[9 + m]
+                # Mandel components of sym(n_k ⊗ n_m) of unit norm
+                scale = 1.0 if k == m else root
+                half = 0.5 * root * scale
+                parts[place, 0] = scale * xk * xm
+                parts[place, 1] = scale * yk * ym
+                parts[place, 2] = scale * zk * zm
+                parts[place, 3] = half * (yk * zm + zk * ym)
+                parts[place, 4] = half * (xk * zm + zk * xm)
+                parts[place, 5] = half * (xk * ym + yk * xm)
+                if k == m:
+                    for i in range(6):
+                        out[start + i] += a * parts[place, i]
+            place += 1
     return 2
+
+
+@njit(folder=_FOLDER)
+def semidefinite(v, start, out, jacobian, work):
+    """As `semidefinite_parts`, with the Jacobian as a matrix; `work` holds at least 18 + 42 entries."""
+    thetas, parts = work[18:24], work[24:60].reshape((6, 6))
+    found = semidefinite_parts(v, start, out, thetas, parts, work)
+    if found == 2:
+        for i in range(6):
+            for j in range(6):
+                value = 0.0
+                for k in range(6):
+                    if thetas[k] != 0.0:
+                        value += thetas[k] * parts[k, i] * parts[k, j]
+                jacobian[i, j] = value
+    return found
 
 
 @njit(folder=_FOLDER)
@@ -310,7 +328,7 @@ def power(x, y, z, alpha, jacobian):
 def project(kind, alpha, v, start, size, out, jacobian, work):
     """Projection of v[start : start + size] on the *dual* of the cone `kind`, into `out`; returns 0 zero, 1 identity, 2 mixed Jacobian.
 
-    For kind ORTHANT the Jacobian is diagonal and stands in jacobian[i, i].
+    `work` holds at least 60 entries. Orthants need no call.
     """
     if kind == SECOND_ORDER:
         return second_order(v, start, size, out, jacobian)

@@ -83,8 +83,7 @@ class ConicStep:
                     f"law '{self.law.name}': the conic program has no solution here: clarabel says '{status}'"
                 )
             return interior_start(self.program, self.data)[0], status
-        small = self.program.compact
-        return (y[None, small.unknowns], multipliers[None, small.rows]), status
+        return self.program.compact.start(y[None], multipliers[None]), status
 
     def unpolished(self, **options: Any) -> tuple[Array | None, Array | None, str]:
         """(unknowns, multipliers) of the reduced program as clarabel leaves them, and its status."""

@@ -169,6 +169,7 @@ class GeneralStep:
         method: str = "general",
         tolerance: float = TOLERANCE,
         start: StepSolution | None = None,
+        threads: int = 1,
     ) -> StepSolution:
         """The step at every point, (n, 6) strains (or stresses), (n, …) packed old states; `method` "general", or "conic" to polish
         clarabel's answer.
@@ -191,7 +192,7 @@ class GeneralStep:
                 warm = start.parts[k].found.y, start.parts[k].found.multipliers
             if method == "conic":
                 warm, _ = interior_start(program, data)
-            found = solve_batch(program, data, tangent=tangent, tolerance=tolerance, start=warm)
+            found = solve_batch(program, data, tangent=tangent, tolerance=tolerance, start=warm, threads=threads)
             slopes[points] = found.slopes[:, :width]
             increment[points] = _increments(program.compact.program, data, found.y)
             if tangents is not None and found.tangent is not None:

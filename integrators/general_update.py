@@ -30,7 +30,8 @@ KEPT = 8
 
 @dataclass(frozen=True)
 class GeneralUpdate:
-    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast).
+    """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast); the engine
+    takes its points in `threads`, which does not change an answer.
 
     Of the formulation "stress" the step takes stresses, with the strain among the unknowns of the program.
     """
@@ -42,15 +43,22 @@ class GeneralUpdate:
     solver: str = "general"
     why: str = ""
     formulation: str = "strain"
+    threads: int = 1
     _steps: dict[Any, GeneralStep] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
     def of(
-        cls, law: Law, tangent: bool = True, solver: str = "general", why: str = "", formulation: str = "strain"
+        cls,
+        law: Law,
+        tangent: bool = True,
+        solver: str = "general",
+        why: str = "",
+        formulation: str = "strain",
+        threads: int = 1,
     ) -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
         declared = declared_step(law, whole=solver != "general" or formulation == "stress")
-        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation)
+        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation, threads)
         found._rehearse()
         return found
 
@@ -150,7 +158,7 @@ class GeneralUpdate:
 
             return reference(step, eps, old, temperature)
         method = "conic" if self.solver == "conic" else "general"
-        return step.solve(eps, old, temperature, tangent=wanted, method=method, start=start)
+        return step.solve(eps, old, temperature, tangent=wanted, method=method, start=start, threads=self.threads)
 
     def outcome(self, eps: Array, old: Array, found: StepSolution) -> tuple[Array, Array]:
         """(packed new state, dissipation of the step [J/m³])."""

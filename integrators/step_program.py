@@ -129,6 +129,13 @@ class StepProgram:
         return kinds, starts, sizes, numbers[0].copy(), numbers[1].copy()
 
     @cached_property
+    def engine_arrays(self) -> tuple[Any, ...]:
+        """What the compiled engine reads, see `general.solve_points`."""
+        from .engine_arrays import engine_arrays
+
+        return engine_arrays(self)
+
+    @cached_property
     def compact(self) -> Any:
         """The same program with scalar terms in place of cones where that can be, see `compact`."""
         from .compact import compact

@@ -26,6 +26,7 @@ from .inverse_step import InversePointers, inverse_pointers
 from .module_store import load_module
 from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
+from .points import run_points
 from .stress_input import raise_stress_failures, stress_array
 from .structure import NoReduction, find_moduli
 from .thermal import thermal_input, thermal_results
@@ -50,6 +51,7 @@ class StressUpdate:
     state_size: int = 0
     why: str = ""
     inverse: bool = False
+    threads: int = 1
 
     formulation = "stress"
 
@@ -106,11 +108,9 @@ class StressUpdate:
         packed_parameters = packed_values(self, values)
         coefficients = self.coefficients(packed_parameters, step_time(dt), heat.temperature)
         old = self.pack(state, n)
-        new, eps = np.empty_like(old), np.empty((n, 6))
-        compliance = np.empty((n, 36)) if self.tangent else np.empty((1, 36))
-        dissipation, status = np.empty(n), np.empty(n, dtype=np.int64)
-        if n:
-            self.pointers.run(sig, old, new, eps, compliance, self.tangent, dissipation, status, coefficients)
+        new, eps, compliance, dissipation, status = run_points(
+            self.pointers, sig, old, coefficients, self.tangent, threads=self.threads
+        )
         raise_stress_failures(status, sig)
         gap = None
         if certify:
@@ -120,7 +120,7 @@ class StressUpdate:
             gap = stress_gap(self, sig, eps, old, new, packed_parameters, dt=dt, temperature=heated)
         found = self.unpack(new)
         entropy, flux = thermal_results(self.law, heat, eps, found, values)
-        shaped = compliance.reshape(n, 6, 6) if self.tangent else None
+        shaped = None if compliance is None else compliance.reshape(n, 6, 6)
         return StepResult(sig, shaped, found, dissipation, status, gap, entropy, flux, eps)
 
     def coefficients(self, parameters: Array, dt: Any, temperature: Array) -> Array:
@@ -149,33 +149,33 @@ class StressUpdate:
         return psi
 
 
-def build_stress_update(law: Law, solver: str = "auto", tangent: bool = True) -> Any:
+def build_stress_update(law: Law, solver: str = "auto", tangent: bool = True, threads: int = 1) -> Any:
     """The cheapest exact method for the step driven by the stress, or the one that is named; see `build_update`."""
     why = "asked for by name"
     if solver == "explicit":
         raise InputError("solver 'explicit' integrates strain paths; it is not available in the stress formulation")
     if solver in ("auto", "closed", "reduced", "principal"):
         try:
-            return _reduced(law, solver, tangent)
+            return _reduced(law, solver, tangent, threads)
         except NoReduction as reason:
             if solver != "auto":
                 raise
             why = f"no cheaper method: {reason}"
     from .general_update import GeneralUpdate
 
-    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why, "stress")
+    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why, "stress", threads)
 
 
-def _reduced(law: Law, solver: str, tangent: bool) -> StressUpdate:
+def _reduced(law: Law, solver: str, tangent: bool, threads: int) -> StressUpdate:
     layout, size = state_layout(law)
     module = load_module(law, solver)
     method = module.METHOD.split()[0]
     if not module.STRAIN_ENERGY:
         module = load_module(law, solver, formulation="stress")
         why = f"{module.WHY}; psi is quadratic in the strain, so its conjugate has the same step"
-        return StressUpdate(law, module, tangent, method, layout, size, why)
+        return StressUpdate(law, module, tangent, method, layout, size, why, False, threads)
     c0, c1 = find_moduli(law).strain
     if c0 == 0 or (c0 + 3 * c1) == 0:
         raise NoReduction(f"law '{law.name}': psi has no quadratic energy that resists every strain")
     why = f"{module.WHY}; with an energy of the strain alone, its inverse is found by Newton's method"
-    return StressUpdate(law, module, tangent, method, layout, size, why, True)
+    return StressUpdate(law, module, tangent, method, layout, size, why, True, threads)

@@ -24,10 +24,11 @@ from .kernels import step_text
 from .module_store import load_module
 from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
+from .points import run_points
 from .relaxed import Evaluation, condensed, relax
 from .structure import NoReduction
 from .thermal import ThermalData, thermal_input, thermal_results
-from .threads import checked_threads, shared
+from .threads import checked_threads
 
 __all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
 
@@ -155,23 +156,7 @@ class Update:
 
     def run(self, eps: Array, old: Array, coefficients: Array, want: bool) -> tuple[Array, Array, Any, Array, Any]:
         """(packed new state, stress, tangent in rows or None, dissipation, status) of packed rows; statuses are not looked at."""
-        n, size = eps.shape
-        kind = np.dtype(self.precision)
-        eps, old = eps.astype(kind, copy=False), old.astype(kind, copy=False)
-        new, stress = np.empty_like(old), np.empty((n, size), dtype=kind)
-        tangent = np.empty((n if want else 1, size * size), dtype=kind)
-        dissipation, status = np.empty(n, dtype=kind), np.empty(n, dtype=np.int64)
-
-        def part(start: int, stop: int) -> None:
-            rows = slice(start, stop)
-            self.pointers.run(
-                eps[rows], old[rows], new[rows], stress[rows], tangent[rows] if want else tangent, want, dissipation[rows],
-                status[rows], coefficients[rows] if len(coefficients) > 1 else coefficients,
-            )  # fmt: skip
-
-        if n:
-            shared(part, n, self.threads)
-        return new, stress, tangent if want else None, dissipation, status
+        return run_points(self.pointers, eps, old, coefficients, want, threads=self.threads, precision=self.precision)
 
     def _relaxed(
         self, eps: Array, old: Array, coefficients: Array
@@ -274,7 +259,7 @@ def build_update(
 
         if precision != "float64":
             raise InputError("precision float32 is there for the strain formulation")
-        driven = build_stress_update(law, solver, tangent)
+        driven = build_stress_update(law, solver, tangent, threads)
         if kinds.name == "3d":
             return driven
         from .embedded import EmbeddedUpdate
@@ -302,7 +287,9 @@ def build_update(
     else:
         from .general_update import GeneralUpdate
 
-        found = GeneralUpdate.of(law, tangent or bool(kinds.relaxed), "general" if solver == "auto" else solver, why)
+        found = GeneralUpdate.of(
+            law, tangent or bool(kinds.relaxed), "general" if solver == "auto" else solver, why, threads=threads
+        )
     if kinds.name == "3d":
         return found
     from .embedded import EmbeddedUpdate

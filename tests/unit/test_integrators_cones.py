@@ -30,7 +30,7 @@ CONES += [(kind, 3, alpha) for kind in (POWER, POWER_DUAL) for alpha in (0.5, 1 
 
 def projected(kind, alpha, v):
     out, jacobian = np.zeros(v.size), np.zeros((6, 6))
-    mark = project(kind, alpha, v, 0, v.size, out, jacobian, np.zeros(24))
+    mark = project(kind, alpha, v, 0, v.size, out, jacobian, np.zeros(60))
     found = jacobian[: v.size, : v.size]
     return out, np.zeros_like(found) if mark == 0 else np.eye(v.size) if mark == 1 else found
 
