@@ -188,6 +188,7 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
             P, T, k0, k1, k2, beta, D = _isotropic(frame[0], frame[1], frame[2], alpha, beta, me, e0, mt, t0)
             l, i, j, c, p, d, w, wi, wj = _linear(full, frame, alpha, me, e0, P, k0, k1, k2)
             n0, n1, n2 = frame[3 + l], frame[6 + l], frame[9 + l]
+            sphere, lone = p, d
             p -= ball
             e_0, e_1, e_2 = c * (z0 - p) + d * n0 * n0, c * (z1 - p) + d * n1 * n1, c * (z2 - p) + d * n2 * n2
             d *= _ROOT
@@ -245,8 +246,13 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
             noise = 4e-16 * (abs(f_0) + abs(g_t * T) + a * q)
             near = 3e-8 * h * gamma + noise
             if h * abs(d_gamma) <= near and h * q * abs(d_slip) <= a * near:
-                done = True
-                break
+                # what is left is added by its first order, if it meets no kink on its way, or is rounding
+                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) / alpha
+                gap = min(abs(T + t0), abs(c * (frame[l] - sphere) + lone + e0))
+                gap = min(gap, abs(c * (frame[i] - sphere) + e0), abs(c * (frame[j] - sphere) + e0))
+                if far <= 1e-6 * gap or (h * abs(d_gamma) <= noise and h * q * abs(d_slip) <= a * noise):
+                    done = True
+                    break
             gamma += d_gamma
             slip += d_slip
             if w_q > 0.0 and slip * w_q >= 1.0:
