@@ -61,7 +61,11 @@ def eigen(t, out):
     j3 = x * (y * z - f * f) - d * (d * z - f * e) + e * (d * f - y * e)
     radius = math.sqrt(j2 / 3.0)
     cosine = min(1.0, abs(j3) / (2.0 * radius * radius * radius))
-    root = 2.0 * radius * math.cos(math.acos(cosine) / 3.0)
+    # u = cos(arccos(x)/3) solves 4u³ − 3u = x in [√3/2, 1]: a cubic, 6e-5 off, and two steps of Newton's method
+    u = 0.8660254 + cosine * (0.1665 + cosine * (-0.0448 + cosine * 0.0123))
+    u -= ((4.0 * u * u - 3.0) * u - cosine) / (12.0 * u * u - 3.0)
+    u -= ((4.0 * u * u - 3.0) * u - cosine) / (12.0 * u * u - 3.0)
+    root = 2.0 * radius * u
     if j3 < 0.0:
         root = -root
     # rows of dev T − root I; their largest cross product spans the kernel
@@ -89,7 +93,7 @@ def eigen(t, out):
     vv, vw, ww = v0 * s0 + v1 * s1 + v2 * s2, v0 * r0 + v1 * r1 + v2 * r2, w0 * r0 + w1 * r1 + w2 * r2
     if vw != 0.0:
         ratio = (ww - vv) / (2.0 * vw)
-        tangent = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + math.hypot(1.0, ratio))
+        tangent = (1.0 if ratio >= 0.0 else -1.0) / (abs(ratio) + math.sqrt(1.0 + ratio * ratio))
         cosine = 1.0 / math.sqrt(1.0 + tangent * tangent)
         sine = tangent * cosine
         v0, w0 = cosine * v0 - sine * w0, sine * v0 + cosine * w0
