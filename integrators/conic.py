@@ -147,7 +147,9 @@ def declare(law: Law, update: Any, program: StepProgram, data: Array, eps: Array
     q, h = program.q0 + program.q1 @ d, program.h0 + program.h1 @ d
     stiffness = float(np.diag(program.C)[:6].max(initial=0.0)) or 1.0
     size = max(
-        float(np.abs(q).max(initial=0.0)), float(np.abs(h).max(initial=0.0)), float(np.abs(eps).max()) * stiffness**0.5
+        float(np.abs(q).max(initial=0.0)),
+        float(np.abs(h).max(initial=0.0)),
+        shown * float(np.abs(eps).max()) * stiffness**0.5,
     )
     size = size or 1.0
     strain_unit = 1.0 / stiffness**0.5

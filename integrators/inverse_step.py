@@ -125,7 +125,14 @@ def advance(sig, rows, tangent, status, stiff, room, control):
         room[i] = tangent[i]
     for i in range(6):
         rows[0, i], rows[4, i] = rows[1, i], -rows[3, i]
-    _factor(room, 1e-14 * stiff)
+    if _factor(room, 1e-9 * stiff) > 0:
+        # W_n hardly curves along some direction: a ridge that fades with the residual keeps the step at the size of the strains
+        ridge = stiff * max(1e-9, 1e-2 * min(1.0, now / (load + noise)))
+        for i in range(36):
+            room[i] = tangent[i]
+        for i in range(6):
+            room[7 * i] += ridge
+        _factor(room, 1e-14 * stiff)
     _substitute(room, rows[4])
     slope = 0.0
     for i in range(6):

@@ -129,6 +129,40 @@ def _linear(r, frame, alpha, m, e0, P, k0, k1, k2):
     return l, i, j, c, p, lone - c * (frame[l] - p), w, 1.0 / (alpha + m * ti) - c, 1.0 / (alpha + m * tj) - c
 
 
+@njit(folder=_FOLDER)
+def _compliance(c, w, wi, wj, z_vv, z_vp, z_pp, dyads, t):
+    """c 𝕀 + w n⊗n + w_i d_i⊗d_i + w_j d_j⊗d_j − (v, p) Z (v, p)ᵀ into a row of 36; `dyads` holds n⊗n, d_i, d_j, v, p."""
+    for k in range(6):
+        n_k, i_k, j_k = w * dyads[0, k], wi * dyads[1, k], wj * dyads[2, k]
+        v_k, p_k = z_vv * dyads[3, k] + z_vp * dyads[4, k], z_vp * dyads[3, k] + z_pp * dyads[4, k]
+        for r in range(6):
+            t[6 * k + r] = (n_k * dyads[0, r] + i_k * dyads[1, r] + j_k * dyads[2, r]) - (
+                v_k * dyads[3, r] + p_k * dyads[4, r]
+            )
+        t[7 * k] += c
+
+
+@njit(folder=_FOLDER)
+def _newton(forward, method, law, rest, given, before, after, out, t, want, loss, row, plan, work):
+    """One point by `inverse_step`: returns its status."""
+    stiff = abs(row[0, 7]) + 3.0 * abs(row[0, 8])
+    rows, tangent, room, control = work[0].reshape(6, 6), work[1:2], work[2], work[3]
+    code = np.zeros(1, dtype=np.int64)
+    begin(rows, control)
+    flag = -1
+    while flag < 0:
+        forward(method, law, rest, rows[1:2], before, after, rows[2:3], tangent, 1, loss, code, row, plan)
+        flag = advance(given, rows, tangent[0], code[0], stiff, room, control)
+    if flag == 0:
+        # once more at the best point, for its state and tangent
+        forward(method, law, rest, rows[1:2], before, after, rows[2:3], tangent, 1, loss, code, row, plan)
+    for k in range(6):
+        out[k] = rows[1, k]
+    if want:
+        inverted(tangent[0], stiff, rows, t)
+    return flag
+
+
 def _points(
     forward, method, law, rest, sig, old, new, strain_out, compliance, want, dissipation, status, coefficients, plan
 ):
@@ -139,8 +173,7 @@ def _points(
     first = 10 + 6 * tensors
     strain = first + 2 * scalars
     frame, full = np.zeros(12), np.zeros(6)
-    rows, tangent, room, control = np.zeros((6, 6)), np.zeros((1, 36)), np.zeros(36), np.zeros(9)
-    loss, code = np.zeros(1), np.zeros(1, dtype=np.int64)
+    loss, work = np.zeros(1), np.zeros((4, 36))
     dyads = np.zeros((5, 6))
     for point in range(sig.shape[0]):
         c_ = coefficients[step * point]
@@ -184,7 +217,8 @@ def _points(
         # stages: 0 elastic, 1 cone, 2 apex; `tried` the apex already
         stage, tried, done, turn = 0, False, False, 0
         slip, gamma, d_slip, d_gamma = 0.0, 0.0, 0.0, 0.0
-        fresh = True
+        fresh, frozen = True, False
+        n_01, n_02, n_12, v0, v1, v2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         flag = 0
         c, w, wi, wj, beta, D, g_b, g_i, g_ii, q = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
         nb, ib, jb = 0.0, 0.0, 0.0
@@ -205,8 +239,25 @@ def _points(
                 alpha, beta = s_0 - drop, s_1 + drop * third - g_t * g_t / w_m
                 ball = g_t * f_0 / w_m
             alpha = max(alpha, _FLAT * s_0)
-            if fresh or not still:
-                t = g_q * slip
+            t = g_q * slip
+            if frozen:
+                # r in the frame of the elastic state: its diagonal, and what is beside it to the first order
+                n0, n1, n2 = frame[3], frame[6], frame[9]
+                u0 = h0 * n0 + _HALF * (h5 * n1 + h4 * n2)
+                u1 = h1 * n1 + _HALF * (h5 * n0 + h3 * n2)
+                u2 = h2 * n2 + _HALF * (h4 * n0 + h3 * n1)
+                n_00 = u0 * n0 + u1 * n1 + u2 * n2
+                n_02 = t * (u0 * frame[5] + u1 * frame[8] + u2 * frame[11])
+                n0, n1, n2 = frame[4], frame[7], frame[10]
+                n_01 = t * (u0 * n0 + u1 * n1 + u2 * n2)
+                u0 = h0 * n0 + _HALF * (h5 * n1 + h4 * n2)
+                u1 = h1 * n1 + _HALF * (h5 * n0 + h3 * n2)
+                u2 = h2 * n2 + _HALF * (h4 * n0 + h3 * n1)
+                n_11 = u0 * n0 + u1 * n1 + u2 * n2
+                n_12 = t * (u0 * frame[5] + u1 * frame[8] + u2 * frame[11])
+                v0, v1, v2 = v0 + t * n_00, v1 + t * n_11, v2 - t * (n_00 + n_11)
+                z0, z1, z2, z3, z4, z5 = r0 + t * h0, r1 + t * h1, r2 + t * h2, r3 + t * h3, r4 + t * h4, r5 + t * h5
+            elif fresh or not still:
                 z0, z1, z2, z3, z4, z5 = r0 + t * h0, r1 + t * h1, r2 + t * h2, r3 + t * h3, r4 + t * h4, r5 + t * h5
                 full[0], full[1], full[2], full[3], full[4], full[5] = z0, z1, z2, z3, z4, z5
                 eigen(full, frame)
@@ -216,10 +267,27 @@ def _points(
             P, T, k0, k1, k2, beta, D = _isotropic(frame[0], frame[1], frame[2], alpha, beta, me, e0, mt, t0)
             l, i, j, c, p, d, w, wi, wj = _linear(full, frame, alpha, me, e0, P, k0, k1, k2)
             n0, n1, n2 = frame[3 + l], frame[6 + l], frame[9 + l]
+            sphere, lone = p, d
             p -= ball
             e_0, e_1, e_2 = c * (z0 - p) + d * n0 * n0, c * (z1 - p) + d * n1 * n1, c * (z2 - p) + d * n2 * n2
             d *= _ROOT
             e_3, e_4, e_5 = c * z3 + d * n1 * n2, c * z4 + d * n0 * n2, c * z5 + d * n0 * n1
+            if frozen and (wi != 0.0 or wj != 0.0):
+                # off-diagonal parts with the stiffness of their pair of axes
+                s, u = 2.0 * wi, 2.0 * wj
+                s *= n_01 if l + i == 1 else n_02 if l + i == 2 else n_12
+                u *= n_01 if l + j == 1 else n_02 if l + j == 2 else n_12
+                x0, x1, x2 = (
+                    s * frame[3 + i] + u * frame[3 + j],
+                    s * frame[6 + i] + u * frame[6 + j],
+                    s * frame[9 + i] + u * frame[9 + j],
+                )
+                e_0, e_1, e_2 = e_0 + n0 * x0, e_1 + n1 * x1, e_2 + n2 * x2
+                e_3, e_4, e_5 = (
+                    e_3 + _HALF * (n1 * x2 + n2 * x1),
+                    e_4 + _HALF * (n0 * x2 + n2 * x0),
+                    e_5 + _HALF * (n0 * x1 + n1 * x0),
+                )
             T = e_0 + e_1 + e_2
             mean = g_q * T * third
             b0, b1, b2 = h0 + (g_q * e_0 - mean), h1 + (g_q * e_1 - mean), h2 + (g_q * e_2 - mean)
@@ -264,6 +332,8 @@ def _points(
                         stage, fresh = 2, True
                         continue
                     break
+                # worth its while where the energy of the strain is strong enough to turn the axes
+                frozen = not still and me > 0.05 * s_0
                 continue
             off, apart = h * gamma - f, slip * q - a * gamma
             m_11, m_12 = -g_t * g_q * g_i - a * q_s, h - g_t * g_t * g_ii - a * q_g
@@ -271,10 +341,16 @@ def _points(
             det = m_11 * m_22 - m_12 * m_21
             d_slip, d_gamma = -(off * m_22 - apart * m_12) / det, -(apart * m_11 - off * m_21) / det
             noise = 4e-16 * (abs(f_0) + abs(g_t * T) + a * q)
-            near = 3e-8 * h * gamma + noise
-            if h * abs(d_gamma) <= near and h * q * abs(d_slip) <= a * near:
-                done = True
-                break
+            near = 2e-7 * h * gamma + noise
+            if not frozen and h * abs(d_gamma) <= near and h * q * abs(d_slip) <= a * near:
+                # what is left is added by its first order, if it meets no kink on its way, or is rounding
+                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) / alpha
+                gap = min(abs(T + t0), abs(c * (frame[l] - sphere) + lone + e0))
+                gap = min(gap, abs(c * (frame[i] - sphere) + e0), abs(c * (frame[j] - sphere) + e0))
+                if far <= 1e-6 * gap or (h * abs(d_gamma) <= noise and h * q * abs(d_slip) <= a * noise):
+                    done = True
+                    break
+            frozen = False
             gamma += d_gamma
             slip += d_slip
             if w_q > 0.0 and slip * w_q >= 1.0:
@@ -286,25 +362,25 @@ def _points(
                 break
         out = strain_out[point]
         if not done:
-            begin(rows, control)
-            flag = -1
-            before, after, row = (
-                old[point : point + 1],
-                new[point : point + 1],
-                coefficients[step * point : step * point + 1],
+            row = coefficients[step * point : step * point + 1]
+            before, after = old[point : point + 1], new[point : point + 1]
+            status[point] = _newton(
+                forward,
+                method,
+                law,
+                rest,
+                given,
+                before,
+                after,
+                out,
+                compliance[min(point, last)],
+                want,
+                loss,
+                row,
+                plan,
+                work,
             )
-            while flag < 0 or (flag == 0 and control[0] < math.inf):
-                if flag == 0:
-                    control[0] = math.inf  # once more at the best point, for its state and tangent
-                forward(method, law, rest, rows[1:2], before, after, rows[2:3], tangent, 1, loss, code, row, plan)
-                if flag < 0:
-                    flag = advance(given, rows, tangent[0], code[0], s_0 + 3.0 * abs(s_1), room, control)
-            for k in range(6):
-                out[k] = rows[1, k]
-            if want:
-                inverted(tangent[0], s_0 + 3.0 * abs(s_1), rows, compliance[min(point, last)])
             dissipation[point] = loss[0]
-            status[point] = flag
             continue
         n0, n1, n2 = frame[3 + l], frame[6 + l], frame[9 + l]
         # A⁻¹ B, and v with A⁻¹ I = v/D
@@ -386,11 +462,4 @@ def _points(
         dyads[2, 0], dyads[2, 1], dyads[2, 2], dyads[2, 3], dyads[2, 4], dyads[2, 5] = j0, j1, j2, j3, j4, j5
         dyads[3, 0], dyads[3, 1], dyads[3, 2], dyads[3, 3], dyads[3, 4], dyads[3, 5] = v0, v1, v2, v3, v4, v5
         dyads[4, 0], dyads[4, 1], dyads[4, 2], dyads[4, 3], dyads[4, 4], dyads[4, 5] = p0, p1, p2, p3, p4, p5
-        for k in range(6):
-            n_k, i_k, j_k = w * dyads[0, k], wi * dyads[1, k], wj * dyads[2, k]
-            v_k, p_k = z_vv * dyads[3, k] + z_vp * dyads[4, k], z_vp * dyads[3, k] + z_pp * dyads[4, k]
-            for r in range(6):
-                t[6 * k + r] = (n_k * dyads[0, r] + i_k * dyads[1, r] + j_k * dyads[2, r]) - (
-                    v_k * dyads[3, r] + p_k * dyads[4, r]
-                )
-            t[7 * k] += c
+        _compliance(c, w, wi, wj, z_vv, z_vp, z_pp, dyads, t)
