@@ -168,10 +168,11 @@ def _project(law, trial, coefficients, first, plan, found, status, count):
             for k in range(n):
                 de[k] = V[k, 0] + multiplier * V[k, 1]
                 bend += w[k] * de[k] * de[k]
+            late = turn >= PATIENCE
             done = turn > 1 and (
                 residual <= near
                 or (residual >= 0.5 * before and residual <= close)
-                or (missed <= close and math.sqrt(bend) <= (near if turn < PATIENCE else 30.0 * near))
+                or (missed <= (8.0 if late else 1.0) * close and math.sqrt(bend) <= (30.0 if late else 1.0) * near)
             )
             if done or not bent:
                 if not done:

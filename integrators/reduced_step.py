@@ -286,5 +286,5 @@ def _step(method, law, rest, eps, old, new, stress, tangent, want, dissipation, 
                 if want:
                     for j in range(36):
                         t[j] = -t[j]
-            if status[m] == 0 and not math.isfinite(s[0] + s[1] + s[2] + s[3] + s[4] + s[5]):
+            if status[m] == 0 and not math.isfinite(s[0] + s[1] + s[2] + s[3] + s[4] + s[5] + lost):
                 status[m] = 2
