@@ -235,10 +235,12 @@ class _Integration:
             step = np.minimum(h[open_], 1.0 - done[open_])
             strain = self.start[open_] + done[open_, None] * whole[open_]
             moved, d_lost, error, size, wrong = self._substep(strain, x[open_], whole[open_], step, open_)
-            scale[open_] = np.maximum(scale[open_], size)
-            relative = error / np.maximum(scale[open_], np.finfo(float).tiny)
+            reached = np.maximum(scale[open_], size)
+            relative = error / np.maximum(reached, np.finfo(float).tiny)
             good = (relative <= self.update.tolerance) & ~wrong
             rows = open_[good]
+            # what a rejected sub-step overshoots to is no stress that was met
+            scale[rows] = reached[good]
             x[rows], lost[rows] = moved[good], lost[rows] + d_lost[good]
             done[rows] += step[good]
             done[rows] = np.where(done[rows] > 1.0 - 1e-14, 1.0, done[rows])

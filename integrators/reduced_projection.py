@@ -304,7 +304,12 @@ def _method(
                 for k in range(n):
                     for l in range(n):
                         bend += de[k] * W[k, l] * de[l]
-                if turn > 0 and missed <= close and math.sqrt(bend) <= (near if turn < PATIENCE else 30.0 * near):
+                late = turn >= PATIENCE
+                if (
+                    turn > 0
+                    and missed <= (8.0 if late else 1.0) * close
+                    and math.sqrt(bend) <= (30.0 if late else 1.0) * near
+                ):
                     # the next step is below rounding, whatever the curvature makes of rounding in the residual
                     flag = 0
                     break

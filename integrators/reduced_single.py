@@ -242,10 +242,14 @@ def _method(
                     for k in range(n):
                         de[k] = v[k] + multiplier * g[k]
                         change += w[k] * de[k] * de[k]
+                    late = turn >= PATIENCE
                     done = turn > 1 and (
                         residual <= near
                         or (residual >= 0.5 * before and residual <= close)
-                        or (missed <= close and math.sqrt(change) <= (near if turn < PATIENCE else 30.0 * near))
+                        or (
+                            missed <= (8.0 if late else 1.0) * close
+                            and math.sqrt(change) <= (30.0 if late else 1.0) * near
+                        )
                     )
                     if done or not bent:
                         if not done:

@@ -214,7 +214,7 @@ def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
         return
     first = ", ".join(str(int(i)) for i in failed[:5])
     reason = {
-        Status.NOT_FINITE: "the stress is not finite",
+        Status.NOT_FINITE: "stress or dissipation is not finite",
         Status.INFEASIBLE: "no plastically admissible stress",
         Status.ITERATION_LIMIT: "iteration limit",
     }

@@ -216,9 +216,11 @@ class Step:
         gamma = X["p"] + tr(X["eps_p"])
         slope = S * (ROOT32 / L(v.M) * gamma / size)[:, None]
         (f,) = self.surfaces(Y)
+        # a mismatch r of flow is made by a stress that is off by r over the curvature, if that is the smaller
+        bend, bow = 3 * self.mu / L(v.M) ** 2 * abs(gamma) / size, self.bulk * abs(gamma) / size
         return {
-            "direction": 2 * self.mu * length(dev(X["eps_p"]) - slope),
-            "dilatancy": self.bulk * abs(tr(X["eps_p"]) - gamma * x / size),
+            "direction": 2 * self.mu * length(dev(X["eps_p"]) - slope) / (1 + bend),
+            "dilatancy": self.bulk * abs(tr(X["eps_p"]) - gamma * x / size) / (1 + bow),
             "complementarity": self._switch(gamma, f),
         }
 
@@ -230,9 +232,10 @@ class Step:
         safe = np.where(root > 0, root, 1)
         t = friction(self.name, v, self.old)
         f = self.surfaces(Y)
+        bend, bow = self.mu * abs(g2) / safe, self.bulk * r * r * abs(g2) / safe  # as in Cam-Clay
         return {
-            "direction": self._ball(dev(X["eps_p"]) - S * (g2 / (2 * safe))[:, None], S, g1 / ROOT2),
-            "dilatancy": self.bulk * abs(tr(X["eps_p"]) - t * g1 + g2 * r * r * excess / safe),
+            "direction": self._ball(dev(X["eps_p"]) - S * (g2 / (2 * safe))[:, None], S, g1 / ROOT2) / (1 + bend),
+            "dilatancy": self.bulk * abs(tr(X["eps_p"]) - t * g1 + g2 * r * r * excess / safe) / (1 + bow),
             "complementarity 0": self._switch(g1, f[0]),
             "complementarity 1": self._switch(g2, f[1]),
         }

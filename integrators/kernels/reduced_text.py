@@ -202,7 +202,7 @@ class _Text:
             else:
                 add(depth, f"rest(e, s, scratch, c[{start}:], want, t)")
         total = " + ".join(f"{force}[{i}]" for i in n)
-        add(depth, f"if status[m] == 0 and not math.isfinite({total}):", "    status[m] = 2")
+        add(depth, f"if status[m] == 0 and not math.isfinite({total} + dissipation[m]):", "    status[m] = 2")
 
     def _slip(self, depth: int) -> None:
         """e_q/q; where the deviator is rounding of the strain it is taken at its limit P_qq."""

@@ -209,11 +209,15 @@ def hand_program(name, v, sig, state):
     before = {k: np.asarray(x) / unit for k, x in state.items()}
     cost = cp.sum_squares(root @ (e - before["eps_p"] - flow)) / 2 - (sig / (E * unit)) @ e
     if name == "von_mises":
-        cost += v["H_k"] / E / 3 * cp.sum_squares(before["alpha"] + flow) + v["H_i"] / E / 2 * cp.square(before["p"] + slip)
+        cost += v["H_k"] / E / 3 * cp.sum_squares(before["alpha"] + flow) + v["H_i"] / E / 2 * cp.square(
+            before["p"] + slip
+        )
         cost += v["sigma_y"] / (E * unit) * slip
         limits = [I6 @ flow == 0, np.sqrt(2 / 3) * cp.norm(DEV @ flow) <= slip]
     else:
-        cost += v["H_k"] / E / 2 * cp.sum_squares(before["alpha"] + flow) + v["H_i"] / E / 2 * cp.square(before["p"] + slip)
+        cost += v["H_k"] / E / 2 * cp.sum_squares(before["alpha"] + flow) + v["H_i"] / E / 2 * cp.square(
+            before["p"] + slip
+        )
         cost += v["C_0"] / (E * unit) * slip
         limits = [I6 @ flow == np.tan(v["theta_f"]) * slip, np.sqrt(2) * cp.norm(DEV @ flow) <= slip]
     if name == "texsol":

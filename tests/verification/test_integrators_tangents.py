@@ -1,6 +1,6 @@
 """The consistent tangent of every law of the library against central differences of its stress, in every region.
 
-States are those of `awkward_states` between a tenth and a hundred yield strains beyond a stress-free or a strained state. A difference is taken
+States are those of `awkward_states`, a tenth to a hundred yield strains beyond a stress-free or a strained state. A difference is taken
 at two widths and extrapolated; where the two disagree, or the two sides, there is a kink, and the state is not judged. A tangent that is
 symmetric and between zero and the stiffness everywhere is asked for in `test_integrators_accuracy`.
 """
