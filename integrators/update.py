@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
@@ -22,6 +22,7 @@ from .declared import state_layout
 from .module_store import load_module
 from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
+from .sensitivity import Sensitivities, sensitivities
 from .structure import NoReduction
 from .thermal import thermal_input, thermal_results
 
@@ -126,6 +127,24 @@ class Update:
         entropy, flux = thermal_results(self.law, heat, eps, found, values)
         shaped = tangent.reshape(n, 6, 6) if self.tangent else None
         return StepResult(stress, shaped, found, dissipation, status, gap, entropy, flux, eps)
+
+    def sensitivities(
+        self,
+        eps_new: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        wrt: Sequence[str] | str | None = None,
+        d_state: Mapping[str, Any] | None = None,
+        d_eps: Any = None,
+        **values: Any,
+    ) -> Sensitivities:
+        """Exact derivatives of the step by parameters, arguments as for the step itself.
+
+        `wrt` names k parameters (all of them, in order, if None; the temperature may be among them); `d_state` by name, (n, …, k), and
+        `d_eps` (n, 6, k) are the derivatives of the old state and of the strain, zero if not given. Raises as the step does.
+        """
+        return sensitivities(self, eps_new, state, dt, wrt, d_state, d_eps, values)
 
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
         """Free energy ρψ [J/m³] at the given strains and internal variables, shape (n,)."""

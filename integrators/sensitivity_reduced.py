@@ -1,0 +1,442 @@
+"""Derivatives of the reduced and closed steps: trial values, the projection, then tensors again, each differentiated where it stands.
+
+Kind 0, n = dev B/q, slip = e_q/q:   d(slip dev B) = slip d(dev B) + n (de_q − slip dq), the second term absent where q is rounding;
+kind 1, dB in the frame of B:        (dF)_ii = de_i,  (dF)_ij = (e_i − e_j)/(b_i − b_j) (dB)_ij, the limit of `reduced_step` where equal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .parameter_slopes import FunctionSlopes, ParameterSlopes
+from .plan import (
+    FIRST_SCALAR,
+    FROZEN,
+    KIND,
+    LINES,
+    METRIC,
+    MOVING,
+    NORM,
+    PLACES,
+    SCALAR_START,
+    SCALARS,
+    STRAIN_START,
+    TENSORS,
+    TRACE_START,
+    TRACES,
+    UNKNOWNS,
+)
+from .sensitivity_answer import ReducedAnswer, closed_faces, function_values, reduced_answer
+from .sensitivity_faces import (
+    Change,
+    Faces,
+    Local,
+    answered,
+    face_slope,
+    find_faces,
+    power_compliance,
+    times,
+)
+from .sensitivity_strain import add_declared_energy, add_unilateral_energies
+
+__all__ = ["StepData", "step_derivatives", "taken"]
+
+Array = NDArray[np.float64]
+_PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
+
+
+@dataclass(frozen=True)
+class StepData:
+    """Points of a step: strains (p, 6), packed old and new states, `kernel` coefficients of the compiled step, `c` (L, N) and `dc`
+    (L, N, K) of `parameter_slopes`, values of θ (numbers or (p,)), dt, which θ the first columns are, d_old (p, size, K), d_eps (p, 6, K)."""
+
+    eps: Array
+    old: Array
+    new: Array
+    kernel: Array
+    c: Array
+    dc: Array
+    theta: list[Any]
+    dt: Any
+    chosen: list[int]
+    d_old: Array
+    d_eps: Array
+
+
+def step_derivatives(update: Any, slopes: ParameterSlopes, step: StepData) -> tuple[Array, Array, Array]:
+    """(dσ (p, 6, K), dX (p, size, K), d dissipation (p, K)) of a step that `update` has taken."""
+    return _Step(update, slopes, step).derivatives()
+
+
+class _Step:
+    def __init__(self, update: Any, slopes: ParameterSlopes, step: StepData) -> None:
+        self.update, self.slopes, self.s = update, slopes, step
+        self.plan = np.array(slopes.plan, dtype=np.int64)
+        p = slopes.plan
+        self.tensors, self.scalars, self.moving, self.frozen = p[TENSORS], p[SCALARS], p[MOVING], p[FROZEN]
+        self.n, self.traces, self.norm, self.first = p[UNKNOWNS], p[TRACES], p[NORM], p[FIRST_SCALAR]
+        self.places = p[PLACES : PLACES + self.tensors]
+        after = PLACES + self.tensors
+        self.scalar_places = list(p[after : after + self.scalars])
+        self.moving_places = list(p[after + self.scalars : after + self.scalars + self.moving])
+        self.frozen_places = list(p[after + self.scalars + self.moving :])
+        self.reduction = slopes.reduction
+        self.quadratic = self.reduction.moduli.quadratic
+        self.width = step.d_eps.shape[2]
+
+    # -- linear maps of coefficients ----------------------------------------------------------------------------------------
+
+    def _linear(self, indices: list[int], basis: Array, changes: list[Array]) -> tuple[Array, Array]:
+        """Σ c_i v_i (p, r) and its derivative (p, r, K); `basis` (p, r, T) the v_i, `changes` their derivatives (None: constant)."""
+        c, dc = self.s.c[:, indices], self.s.dc[:, indices]
+        value = times(basis, c[:, :, None])[:, :, 0]
+        slope = times(basis, dc)
+        for i, change in enumerate(changes):
+            if change is not None:
+                slope += c[:, i, None, None] * change
+        return value, slope
+
+    def _tensor(self, pairs: list[tuple[int, int]], constant: int, vectors: list[Array], changes: list[Array]) -> Any:
+        """Σ (c₀ v + c₁ tr v I) + c I over tensors v (p, 6), and the derivative."""
+        count = len(vectors[0])
+        sphere = np.zeros((count, 6, 1 + len(vectors)))
+        sphere[:, :3, 0] = 1.0
+        for i, v in enumerate(vectors):
+            sphere[:, :3, 1 + i] = v[:, :3].sum(axis=1)[:, None]
+        basis = np.concatenate([np.stack(vectors, axis=2), sphere], axis=2)
+        indices = [pair[0] for pair in pairs] + [constant] + [pair[1] for pair in pairs]
+        value, slope = self._linear(indices, basis, list(changes))
+        total = 0.0
+        for (_, second), change in zip(pairs, changes, strict=True):
+            weight = self.s.c[:, second]
+            if weight.any():
+                total = total + weight[:, None] * change[:, :3].sum(axis=1)
+        if not np.isscalar(total):
+            slope[:, :3] += np.asarray(total)[:, None, :]
+        return value, slope
+
+    # -- the step -----------------------------------------------------------------------------------------------------------
+
+    def derivatives(self) -> tuple[Array, Array, Array]:
+        s, count = self.s, len(self.s.eps)
+        stress_pairs, base_pairs, old_changes, new_changes = [(0, 1)], [(3, 4)], [s.d_eps], [s.d_eps]
+        old_vectors, new_vectors = [s.eps], [s.eps]
+        d_new = s.d_old.copy()
+        for k, p in enumerate(self.places):
+            o = 6 + 5 * k
+            base_pairs.append((o, o + 1))
+            stress_pairs.append((o + 2, o + 3))
+            old_vectors.append(s.old[:, p : p + 6])
+            old_changes.append(s.d_old[:, p : p + 6])
+        lost = np.zeros((count, self.width))
+        if self.n:
+            _, d_base = self._tensor(base_pairs, 5, old_vectors, old_changes)
+            answer, faces, local = self._answer()
+            if self.plan[KIND] == 0:
+                d_base[:, :3] -= d_base[:, :3].mean(axis=1)[:, None, :]
+                de, dz = self._norm_flow(answer, faces, local, d_base, d_new)
+            else:
+                de, dz = self._principal_flow(answer, faces, local, d_base, d_new)
+            for j, p in enumerate(self.moving_places):
+                d_new[:, p] += de[:, self.first + j]
+            lost = (de * answer.z[:, :, None] + dz * answer.e[:, :, None]).sum(axis=1)
+        for p in self.places:
+            new_vectors.append(s.new[:, p : p + 6])
+            new_changes.append(d_new[:, p : p + 6])
+        _, d_stress = self._tensor(stress_pairs, 2, new_vectors, new_changes)
+        moduli = self.reduction.moduli
+        if moduli.rest != 0:
+            known = dict(zip(self.slopes.symbols, s.theta, strict=True)) | {self.reduction.law.observable: s.eps}
+            add_declared_energy(
+                d_stress, self.reduction.law, moduli.rest, known, s.d_eps, [self.slopes.symbols[i] for i in s.chosen]
+            )
+        elif moduli.alone:
+            start, traces, spectral = int(self.plan[STRAIN_START]), len(moduli.traces), len(moduli.spectral)
+            add_unilateral_energies(d_stress, s.eps, s.d_eps, s.c, s.dc, start, traces, spectral)
+        return d_stress, d_new, lost
+
+    def _trial(self, d_head: Array | None) -> Array:
+        """dz^tr (p, n, K), the head of norm or principal values given."""
+        s, count = self.s, len(self.s.eps)
+        found = np.zeros((count, self.n, self.width))
+        if d_head is not None:
+            found[:, : d_head.shape[1]] = d_head
+        step = 2 + 2 * self.tensors
+        for i in range(self.traces if self.plan[KIND] == 0 else 0):
+            o = int(self.plan[TRACE_START]) + step * i
+            basis = np.ones((count, 1, 2 + self.tensors))
+            basis[:, 0, 0] = s.eps[:, :3].sum(axis=1)
+            changes: list[Any] = [s.d_eps[:, :3].sum(axis=1)[:, None], None]
+            for k, p in enumerate(self.places):
+                basis[:, 0, 2 + k] = s.old[:, p : p + 3].sum(axis=1)
+                changes.append(s.d_old[:, p : p + 3].sum(axis=1)[:, None])
+            indices = [o, o + 1, *(o + 2 + 2 * k for k in range(self.tensors))]
+            found[:, self.norm + i] = self._linear(indices, basis, changes)[1][:, 0]
+        for j in range(self.moving if self.quadratic else 0):
+            o = int(self.plan[SCALAR_START]) + (1 + self.scalars) * j
+            basis = np.ones((count, 1, 1 + self.scalars))
+            changes = [None]
+            for i, p in enumerate(self.scalar_places):
+                basis[:, 0, 1 + i] = s.old[:, p]
+                changes.append(s.d_old[:, p : p + 1])
+            found[:, self.first + j] = self._linear(list(range(o, o + 1 + self.scalars)), basis, changes)[1][:, 0]
+        return found
+
+    # -- the answer and its faces ---------------------------------------------------------------------------------------------
+
+    def _orders(self) -> Array:
+        return np.array(self.reduction.order_rows, dtype=float).reshape(-1, self.n)
+
+    def _metric(self) -> Array:
+        start = int(self.plan[METRIC])
+        return self.s.c[:, start : start + self.n * self.n].reshape(-1, self.n, self.n)
+
+    def _affine_local(self, z: Array) -> Local:
+        m, n, start = len(self.reduction.surfaces), self.n, int(self.plan[LINES])
+        lines = self.s.c[:, start : start + m * (n + 1)].reshape(-1, m, n + 1)
+        orders = np.broadcast_to(self._orders()[None], (len(lines), *self._orders().shape))
+        normals = np.concatenate([lines[:, :, :n], orders], axis=1)
+        f = np.einsum("lij,pj->pi", normals, z) if len(normals) == 1 else np.einsum("pij,pj->pi", normals, z)
+        f[:, :m] += lines[:, :, n]
+        return Local(self._metric(), f, normals, np.zeros_like(z), None)
+
+    def _curved_local(self, z: Array, gamma: Array) -> Local:
+        """Functions at z; γ is that of the surfaces and orders."""
+        data = self._data_at_end()
+        m = len(self.reduction.functions)
+        pointers = self.update.pointers
+        f, g, flow, hessian, block = function_values(pointers.law, self.plan, z, data, gamma[:, :m], self.s.kernel)
+        orders = self._orders()
+        normals = np.concatenate([g, np.broadcast_to(orders, (len(z), *orders.shape))], axis=1)
+        metric = np.array(np.broadcast_to(self._metric(), (len(z), self.n, self.n)))
+        if not self.quadratic:
+            metric[:, self.first :, self.first :] = block
+        return Local(metric, np.concatenate([f, z @ orders.T], axis=1), normals, flow, hessian)
+
+    def _data_at_end(self) -> Array:
+        """Moving scalars at the end of the step, frozen ones at its start."""
+        return np.hstack([self.s.new[:, self.moving_places], self.s.old[:, self.frozen_places]])
+
+    def _answer(self) -> tuple[ReducedAnswer, Faces, Local]:
+        s = self.s
+        if self.update.module.METHOD == "closed":
+            return self._closed_answer()
+        answer = reduced_answer(self.update.pointers, self.update.pointers.plan, s.kernel, s.eps, s.old)
+        soft = self.reduction.soft is not None
+        if self.reduction.affine:
+            local = self._affine_local(answer.z)
+            return answer, find_faces(local, answer, False, False, lambda points, gamma: (None, None)), local
+        m = len(self.reduction.functions) + len(self.reduction.order_rows)
+        local = self._curved_local(answer.z, np.zeros((len(answer.z), m)))
+
+        def bend(points: Any, gamma: Array) -> tuple[Array, Array | None]:
+            part = _Step(self.update, self.slopes, taken(s, points))
+            hessian = part._curved_local(answer.z[points], gamma).hessian
+            assert hessian is not None
+            if not soft or not (gamma[:, 0] > 0.0).all():
+                return hessian, None
+            return hessian, power_compliance(gamma[:, 0], part._functions(answer.z[points], gamma))[0]
+
+        faces = find_faces(local, answer, self.reduction.finite != 0, soft, bend)
+        return answer, faces, self._curved_local(answer.z, faces.gamma)
+
+    def _closed_answer(self) -> tuple[ReducedAnswer, Faces, Local]:
+        s = self.s
+        bare = reduced_answer(None, self.plan, s.c, s.eps, s.old)
+        region = closed_faces(self.update.pointers.plan, s.kernel, s.eps, s.old)
+        local = self._affine_local(bare.trial)
+        count, m = local.f.shape
+        e, z, gamma = np.zeros_like(bare.trial), bare.trial.copy(), np.zeros((count, m))
+        slope = np.zeros((count, self.n, self.n))
+        members: list[tuple[int, ...]] = []
+        groups: list[NDArray[np.int64]] = []
+        for number in np.unique(region):
+            rows = [[], [0], [0, 1]][int(number)]
+            points = np.flatnonzero(region == number)
+            here = local.at(points)
+            if rows:
+                found, good = _affine_multipliers(here, rows)
+                if not good.all():
+                    # an apex that no modulus but that of the norm holds: a cohesion of zero
+                    rows = [0]
+                    found, _ = _affine_multipliers(here, rows)
+                gamma[np.ix_(points, rows)] = found
+                e[points] = np.einsum(
+                    "pi,pij->pj", found, np.broadcast_to(here.normals, (len(points), m, self.n))[:, rows]
+                )
+                z[points] -= times(e[points][:, None, :], here.metric)[:, 0]
+                slope[points] = face_slope(here, rows)
+            members.append(tuple(rows))
+            groups.append(points)
+        answer = replace(bare, e=e, z=z, slope=slope)
+        return answer, Faces(members, groups, gamma), local
+
+    def _functions(self, z: Array, gamma: Array) -> FunctionSlopes:
+        m = len(self.reduction.functions)
+        return self.slopes.functions(z, self._data_at_end(), gamma[:, :m], self.s.theta, self.s.dt)
+
+    def _respond(self, answer: ReducedAnswer, faces: Faces, local: Local, d_trial: Array) -> tuple[Array, Array]:
+        """(de, dz) at all points from dz^tr."""
+        s, n = self.s, self.n
+        count = len(answer.z)
+        a = d_trial.copy()
+        start = int(self.plan[METRIC])
+        d_metric = s.dc[:, start : start + n * n].reshape(-1, n, n * self.width)
+        a -= times(answer.e[:, None, :], d_metric).reshape(count, n, self.width)
+        m = len(local.f[0])
+        b, c = np.zeros((count, n, self.width)), np.zeros((count, m, self.width))
+        slopes: FunctionSlopes | None = None
+        if self.reduction.affine:
+            surfaces, lines = len(self.reduction.surfaces), int(self.plan[LINES])
+            d_lines = s.dc[:, lines : lines + surfaces * (n + 1)].reshape(-1, surfaces, n + 1, self.width)
+            for i in range(surfaces):
+                if d_lines[:, i].any():
+                    b += faces.gamma[:, i, None, None] * d_lines[:, i, :n]
+                    c[:, i] = times(answer.z[:, None, :], d_lines[:, i, :n])[:, 0] + d_lines[:, i, n]
+        else:
+            slopes = self._functions(answer.z, faces.gamma)
+            b = self._chained(slopes.gradient)
+            c[:, : len(self.reduction.functions)] = self._chained(slopes.surfaces)
+            if not self.quadratic:
+                # R(s) with s = s_n + e: the change of s_n acts through the modulus at the end
+                block = local.metric[:, self.first :, self.first :]
+                d_start = np.stack([s.d_old[:, p] for p in self.moving_places], axis=1)
+                a[:, self.first :] = self._chained(slopes.forces) - np.matmul(block, d_start)
+        de, dz = np.zeros_like(a), a.copy()
+        for rows, points in zip(faces.members, faces.points, strict=True):
+            here = local.at(points)
+            chosen = list(rows)
+            if not chosen and here.hessian is None:
+                continue
+            change = Change(a[points], b[points], c[points][:, chosen])
+            if not chosen:
+                change = replace(change, c=np.zeros((len(points), 0, self.width)))
+                if self.reduction.finite == 0:
+                    continue
+            if self.reduction.soft is not None and chosen[:1] == [0]:
+                assert slopes is not None
+                part = FunctionSlopes(*(getattr(slopes, f)[points] for f in FunctionSlopes.__dataclass_fields__))
+                compliance, moved = power_compliance(faces.gamma[points, 0], part)
+                shift = change.c.copy()
+                shift[:, 0] += self._chained(moved[:, None, :], points)[:, 0]
+                change = replace(change, c=shift, compliance=compliance)
+            de[points], dz[points] = answered(here, chosen, change)
+        return de, dz
+
+    def _chained(self, slopes: Array, points: Any = slice(None)) -> Array:
+        """Derivatives (p, r, θ + frozen) as those by the columns (p, r, K)."""
+        found = np.zeros((*slopes.shape[:2], self.width))
+        found[:, :, : len(self.s.chosen)] = slopes[:, :, self.s.chosen]
+        behind = len(self.slopes.names)
+        for j, p in enumerate(self.frozen_places):
+            found += slopes[:, :, behind + j, None] * self.s.d_old[points][:, p][:, None, :]
+        return found
+
+    # -- tensors again --------------------------------------------------------------------------------------------------------
+
+    def _norm_flow(
+        self, answer: ReducedAnswer, faces: Faces, local: Local, d_base: Array, d_new: Array
+    ) -> tuple[Array, Array]:
+        s, count = self.s, len(self.s.eps)
+        normal, slip = np.zeros((count, 6)), np.zeros(count)
+        d_head = None
+        if self.norm:
+            q, e_q = answer.trial[:, 0], answer.e[:, 0]
+            # the same test as in `reduced_step`: where the deviator is rounding of the strain, the limit P_qq
+            size = 1e-13 * np.abs(s.c[:, 3]) * np.abs(s.eps).max(axis=1)
+            clear = (q > size) & (np.abs(e_q) < 1e280 * q)
+            safe = np.where(clear, q, 1.0)
+            slip = np.where(clear, e_q / safe, answer.slope[:, 0, 0])
+            modulus = self._metric()[:, 0, 0]
+            slip = np.where(modulus > 0.0, np.clip(slip, 0.0, 1.0 / np.where(modulus > 0.0, modulus, 1.0)), slip)
+            normal = np.where(clear[:, None], answer.b / safe[:, None], 0.0)
+            d_head = np.matmul(normal[:, None, :], d_base)
+        d_trial = self._trial(d_head)
+        de, dz = self._respond(answer, faces, local, d_trial)
+        flow, d_flow = slip[:, None] * answer.b, slip[:, None, None] * d_base
+        if self.norm:
+            d_flow += normal[:, :, None] * (de[:, 0] - slip[:, None] * d_trial[:, 0])[:, None, :]
+        for k, p in enumerate(self.places):
+            o = 6 + 5 * k
+            weight, d_weight = s.c[:, o + 4], s.dc[:, o + 4]
+            if weight.any() or d_weight.any():
+                d_new[:, p : p + 6] += weight[:, None, None] * d_flow
+                if d_weight.any():
+                    d_new[:, p : p + 6] += times(flow[:, :, None], d_weight[:, None, :])
+            for j in range(self.traces):
+                i = int(self.plan[TRACE_START]) + (2 + 2 * self.tensors) * j + 3 + 2 * k
+                ball = s.c[:, i, None] * de[:, self.norm + j] + s.dc[:, i] * answer.e[:, self.norm + j, None]
+                d_new[:, p : p + 3] += ball[:, None, :]
+        return de, dz
+
+    def _principal_flow(
+        self, answer: ReducedAnswer, faces: Faces, local: Local, d_base: Array, d_new: Array
+    ) -> tuple[Array, Array]:
+        s = self.s
+        values, vectors = answer.axes[:, :3], answer.axes[:, 3:].reshape(-1, 3, 3)
+        frame = np.empty((len(values), 6, 6))
+        for row, (l, m) in enumerate(_PAIRS):
+            x, y = vectors[:, :, l], vectors[:, :, m]
+            for i, (r, t) in enumerate(_PAIRS):
+                frame[:, row, i] = 0.5 * (x[:, r] * y[:, t] + x[:, t] * y[:, r]) * (1.0 if r == t else np.sqrt(2.0))
+            if l != m:
+                frame[:, row] *= np.sqrt(2.0)
+        inside = np.matmul(frame, d_base)
+        d_trial = self._trial(inside[:, :3])
+        de, dz = self._respond(answer, faces, local, d_trial)
+        e, slope = answer.e, answer.slope
+        size = np.abs(values).sum(axis=1)
+        turned = np.empty_like(inside)
+        turned[:, :3] = de[:, :3]
+        for row, (l, m) in enumerate(_PAIRS[3:], start=3):
+            gap = values[:, l] - values[:, m]
+            apart = np.abs(gap) > 1e-9 * size
+            limit = 0.5 * (slope[:, l, l] + slope[:, m, m]) - 0.5 * (slope[:, l, m] + slope[:, m, l])
+            theta = np.where(apart, (e[:, l] - e[:, m]) / np.where(apart, gap, 1.0), limit)
+            turned[:, row] = theta[:, None] * inside[:, row]
+        d_flow = np.matmul(frame.transpose(0, 2, 1), turned)
+        flow = np.matmul(frame[:, :3].transpose(0, 2, 1), e[:, :3, None])[:, :, 0]
+        for k, p in enumerate(self.places):
+            o = 6 + 5 * k
+            d_new[:, p : p + 6] += s.c[:, o + 4, None, None] * d_flow
+            if s.dc[:, o + 4].any():
+                d_new[:, p : p + 6] += times(flow[:, :, None], s.dc[:, o + 4][:, None, :])
+        return de, dz
+
+
+def _affine_multipliers(local: Local, rows: list[int]) -> tuple[Array, NDArray[np.bool_]]:
+    """γ of an active set from f at the trial, and where the set is independent."""
+    G = local.normals[:, rows]
+    gram = G @ local.metric @ G.transpose(0, 2, 1)
+    diagonal = np.diagonal(gram, axis1=1, axis2=2)
+    root = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
+    unit = gram * root[:, :, None] * root[:, None, :]
+    good = np.linalg.eigvalsh(unit)[:, 0] > 1e-14
+    unit = np.where(good[:, None, None], unit, np.eye(len(rows)))
+    found = np.linalg.solve(unit, (local.f[:, rows] * root)[:, :, None])[:, :, 0] * root
+    return found, good
+
+
+def taken(step: StepData, points: Any) -> StepData:
+    """The step at some of its points."""
+
+    def at(value: Any) -> Any:
+        return value[points] if isinstance(value, np.ndarray) and value.ndim and value.shape[0] > 1 else value
+
+    return StepData(
+        step.eps[points],
+        step.old[points],
+        step.new[points],
+        at(step.kernel),
+        at(step.c),
+        at(step.dc),
+        [at(t) for t in step.theta],
+        at(step.dt),
+        step.chosen,
+        step.d_old[points],
+        step.d_eps[points],
+    )
