@@ -6,6 +6,8 @@ from .driver import drive
 from .history import History, drive_arrays
 from .module_store import module_source
 from .path_file import StrainStressPath, read_path, write_history
+from .sensitivity import Sensitivities
+from .sensitivity_path import PathSensitivities, path_sensitivities
 from .update import StepResult, Update, build_update
 
 __all__ = [
@@ -13,6 +15,8 @@ __all__ = [
     "ConicStep",
     "ConvergenceError",
     "History",
+    "PathSensitivities",
+    "Sensitivities",
     "StepResult",
     "StrainStressPath",
     "Update",
@@ -21,6 +25,7 @@ __all__ = [
     "drive",
     "drive_arrays",
     "module_source",
+    "path_sensitivities",
     "read_path",
     "write_history",
 ]

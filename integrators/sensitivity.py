@@ -21,7 +21,7 @@ from .thermal import thermal_input
 __all__ = ["Sensitivities", "chosen_names", "derivative_rows", "sensitivities"]
 
 Array = NDArray[np.float64]
-BLOCK = 1024
+BLOCK = 4096
 
 
 @dataclass(frozen=True)
@@ -134,6 +134,7 @@ def _reduced(
     d_eps: Array,
 ) -> tuple[Array, Array, Array]:
     from .parameter_slopes import parameter_slopes
+    from .sensitivity_answer import reduced_answer
     from .sensitivity_reduced import StepData, step_derivatives, taken
     from .update import packed_values, raise_failures
 
@@ -155,7 +156,11 @@ def _reduced(
     chosen = [slopes.names.index(name) for name in names]
     dc = np.zeros((*c.shape, width))
     dc[:, :, : len(chosen)] = all_slopes[:, :, chosen]
-    whole = StepData(eps, old, new, kernel, c, dc, theta, dt, chosen, d_old, d_eps)
+    if update.module.METHOD == "closed":
+        answer = reduced_answer(None, np.array(slopes.plan, dtype=np.int64), c, eps, old)
+    else:
+        answer = reduced_answer(pointers, pointers.plan, kernel, eps, old)
+    whole = StepData(eps, old, new, kernel, c, dc, answer, theta, dt, chosen, d_old, d_eps)
     d_stress, d_new, d_lost = np.empty((n, 6, width)), np.empty((n, old.shape[1], width)), np.empty((n, width))
     for start in range(0, n, BLOCK):
         block = slice(start, min(n, start + BLOCK))

@@ -61,6 +61,10 @@ class ReducedAnswer:
     z: Array
     slope: Array
 
+    def at(self, points: Any) -> ReducedAnswer:
+        """The same at some of the points."""
+        return ReducedAnswer(*(getattr(self, f)[points] for f in ReducedAnswer.__dataclass_fields__))
+
 
 def reduced_answer(
     pointers: StepPointers | None, plan: NDArray[np.int64], coefficients: Array, eps: Array, old: Array

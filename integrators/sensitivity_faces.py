@@ -228,7 +228,10 @@ def _into(left: Array, right: Array) -> Array:
     """left (L, i, j) · right (p, j, k)."""
     if left.shape[0] > 1 or right.shape[0] == 1:
         return np.matmul(left, right)
-    return np.einsum("ij,pjk->pik", left[0], right)
+    found = np.zeros((right.shape[0], left.shape[1], right.shape[2]))
+    for i, j in zip(*np.nonzero(left[0]), strict=True):
+        found[:, i] += left[0, i, j] * right[:, j]
+    return found
 
 
 def power_compliance(gamma: Array, slopes: FunctionSlopes) -> tuple[Array, Array]:

@@ -30,7 +30,7 @@ from .plan import (
     TRACES,
     UNKNOWNS,
 )
-from .sensitivity_answer import ReducedAnswer, closed_faces, function_values, reduced_answer
+from .sensitivity_answer import ReducedAnswer, closed_faces, function_values
 from .sensitivity_faces import (
     Change,
     Faces,
@@ -52,7 +52,7 @@ _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
 @dataclass(frozen=True)
 class StepData:
     """Points of a step: strains (p, 6), packed old and new states, `kernel` coefficients of the compiled step, `c` (L, N) and `dc`
-    (L, N, K) of `parameter_slopes`, values of θ (numbers or (p,)), dt, which θ the first columns are, d_old (p, size, K), d_eps (p, 6, K)."""
+    (L, N, K) of `parameter_slopes`, the `answer` of the method (of a closed form the trial only), values of θ (numbers or (p,)), dt, which θ the first columns are, d_old (p, size, K), d_eps (p, 6, K)."""
 
     eps: Array
     old: Array
@@ -60,6 +60,7 @@ class StepData:
     kernel: Array
     c: Array
     dc: Array
+    answer: ReducedAnswer
     theta: list[Any]
     dt: Any
     chosen: list[int]
@@ -87,43 +88,55 @@ class _Step:
         self.reduction = slopes.reduction
         self.quadratic = self.reduction.moduli.quadratic
         self.width = step.d_eps.shape[2]
+        self.old_moves = bool(step.d_old.any())
+        self.strain_moves = bool(step.d_eps.any())
+        self.live = step.dc.any(axis=(0, 2))
 
     # -- linear maps of coefficients ----------------------------------------------------------------------------------------
 
-    def _linear(self, indices: list[int], basis: Array, changes: list[Array]) -> tuple[Array, Array]:
-        """Σ c_i v_i (p, r) and its derivative (p, r, K); `basis` (p, r, T) the v_i, `changes` their derivatives (None: constant)."""
-        c, dc = self.s.c[:, indices], self.s.dc[:, indices]
-        value = times(basis, c[:, :, None])[:, :, 0]
-        slope = times(basis, dc)
-        for i, change in enumerate(changes):
-            if change is not None:
-                slope += c[:, i, None, None] * change
-        return value, slope
+    def _explicit(self, indices: list[int], basis: list[Array], out: Array) -> None:
+        """Add Σ dc_i v_i to `out` (p, r, K) over the entries whose coefficient depends on θ; `basis` holds v_i (p, r)."""
+        live = [(v, self.s.dc[:, i]) for i, v in zip(indices, basis, strict=True) if self.live[i]]
+        if live:
+            out += times(np.stack([v for v, _ in live], axis=2), np.stack([d for _, d in live], axis=1))
 
-    def _tensor(self, pairs: list[tuple[int, int]], constant: int, vectors: list[Array], changes: list[Array]) -> Any:
-        """Σ (c₀ v + c₁ tr v I) + c I over tensors v (p, 6), and the derivative."""
-        count = len(vectors[0])
-        sphere = np.zeros((count, 6, 1 + len(vectors)))
-        sphere[:, :3, 0] = 1.0
-        for i, v in enumerate(vectors):
-            sphere[:, :3, 1 + i] = v[:, :3].sum(axis=1)[:, None]
-        basis = np.concatenate([np.stack(vectors, axis=2), sphere], axis=2)
-        indices = [pair[0] for pair in pairs] + [constant] + [pair[1] for pair in pairs]
-        value, slope = self._linear(indices, basis, list(changes))
-        total = 0.0
-        for (_, second), change in zip(pairs, changes, strict=True):
-            weight = self.s.c[:, second]
-            if weight.any():
-                total = total + weight[:, None] * change[:, :3].sum(axis=1)
-        if not np.isscalar(total):
-            slope[:, :3] += np.asarray(total)[:, None, :]
-        return value, slope
+    def _tensor(self, pairs: list[tuple[int, int]], constant: int, vectors: list[Array], changes: list[Any]) -> Array:
+        """Derivative (p, 6, K) of Σ (c₀ v + c₁ tr v I) + c I over tensors v (p, 6)."""
+        c = self.s.c
+        total = np.zeros((len(vectors[0]), 6, self.width))
+        sphere = np.zeros((len(vectors[0]), self.width))
+        round_ = np.zeros((len(vectors[0]), 1, self.width))
+        for (first, second), change in zip(pairs, changes, strict=True):
+            if change is None:
+                continue
+            if c[:, first].any():
+                total += c[:, first, None, None] * change
+            if c[:, second].any():
+                sphere += c[:, second, None] * _trace(change)
+        self._explicit([pair[0] for pair in pairs], vectors, total)
+        traces = [_trace(v)[:, None] for v in vectors]
+        self._explicit([constant, *(pair[1] for pair in pairs)], [np.ones((len(total), 1)), *traces], round_)
+        sphere += round_[:, 0]
+        total[:, :3] += sphere[:, None, :]
+        return total
+
+    def _scalar(self, indices: list[int], basis: list[Any], changes: list[Any]) -> Array:
+        """Derivative (p, K) of Σ c_i v_i over numbers v_i (p,); a change None is of a constant."""
+        total = np.zeros((len(self.s.eps), 1, self.width))
+        for i, change in zip(indices, changes, strict=True):
+            if change is not None and self.s.c[:, i].any():
+                total[:, 0] += self.s.c[:, i, None] * change
+        self._explicit(indices, [v[:, None] for v in basis], total)
+        return total[:, 0]
 
     # -- the step -----------------------------------------------------------------------------------------------------------
 
     def derivatives(self) -> tuple[Array, Array, Array]:
         s, count = self.s, len(self.s.eps)
-        stress_pairs, base_pairs, old_changes, new_changes = [(0, 1)], [(3, 4)], [s.d_eps], [s.d_eps]
+        d_eps = s.d_eps if self.strain_moves else None
+        stress_pairs, base_pairs = [(0, 1)], [(3, 4)]
+        old_changes: list[Any] = [d_eps]
+        new_changes: list[Any] = [d_eps]
         old_vectors, new_vectors = [s.eps], [s.eps]
         d_new = s.d_old.copy()
         for k, p in enumerate(self.places):
@@ -131,13 +144,13 @@ class _Step:
             base_pairs.append((o, o + 1))
             stress_pairs.append((o + 2, o + 3))
             old_vectors.append(s.old[:, p : p + 6])
-            old_changes.append(s.d_old[:, p : p + 6])
+            old_changes.append(s.d_old[:, p : p + 6] if self.old_moves else None)
         lost = np.zeros((count, self.width))
         if self.n:
-            _, d_base = self._tensor(base_pairs, 5, old_vectors, old_changes)
+            d_base = self._tensor(base_pairs, 5, old_vectors, old_changes)
             answer, faces, local = self._answer()
             if self.plan[KIND] == 0:
-                d_base[:, :3] -= d_base[:, :3].mean(axis=1)[:, None, :]
+                d_base[:, :3] -= _trace(d_base)[:, None, :] / 3.0
                 de, dz = self._norm_flow(answer, faces, local, d_base, d_new)
             else:
                 de, dz = self._principal_flow(answer, faces, local, d_base, d_new)
@@ -147,7 +160,7 @@ class _Step:
         for p in self.places:
             new_vectors.append(s.new[:, p : p + 6])
             new_changes.append(d_new[:, p : p + 6])
-        _, d_stress = self._tensor(stress_pairs, 2, new_vectors, new_changes)
+        d_stress = self._tensor(stress_pairs, 2, new_vectors, new_changes)
         moduli = self.reduction.moduli
         if moduli.rest != 0:
             known = dict(zip(self.slopes.symbols, s.theta, strict=True)) | {self.reduction.law.observable: s.eps}
@@ -165,25 +178,20 @@ class _Step:
         found = np.zeros((count, self.n, self.width))
         if d_head is not None:
             found[:, : d_head.shape[1]] = d_head
-        step = 2 + 2 * self.tensors
+        step, one = 2 + 2 * self.tensors, np.ones(count)
         for i in range(self.traces if self.plan[KIND] == 0 else 0):
             o = int(self.plan[TRACE_START]) + step * i
-            basis = np.ones((count, 1, 2 + self.tensors))
-            basis[:, 0, 0] = s.eps[:, :3].sum(axis=1)
-            changes: list[Any] = [s.d_eps[:, :3].sum(axis=1)[:, None], None]
-            for k, p in enumerate(self.places):
-                basis[:, 0, 2 + k] = s.old[:, p : p + 3].sum(axis=1)
-                changes.append(s.d_old[:, p : p + 3].sum(axis=1)[:, None])
+            states = [slice(p, p + 3) for p in self.places]
+            basis = [_trace(s.eps), one, *(_trace(s.old[:, p]) for p in states)]
+            changes: list[Any] = [_trace(s.d_eps) if self.strain_moves else None, None]
+            changes += [_trace(s.d_old[:, p]) if self.old_moves else None for p in states]
             indices = [o, o + 1, *(o + 2 + 2 * k for k in range(self.tensors))]
-            found[:, self.norm + i] = self._linear(indices, basis, changes)[1][:, 0]
+            found[:, self.norm + i] = self._scalar(indices, basis, changes)
         for j in range(self.moving if self.quadratic else 0):
             o = int(self.plan[SCALAR_START]) + (1 + self.scalars) * j
-            basis = np.ones((count, 1, 1 + self.scalars))
-            changes = [None]
-            for i, p in enumerate(self.scalar_places):
-                basis[:, 0, 1 + i] = s.old[:, p]
-                changes.append(s.d_old[:, p : p + 1])
-            found[:, self.first + j] = self._linear(list(range(o, o + 1 + self.scalars)), basis, changes)[1][:, 0]
+            basis = [one, *(s.old[:, p] for p in self.scalar_places)]
+            changes = [None, *(s.d_old[:, p] if self.old_moves else None for p in self.scalar_places)]
+            found[:, self.first + j] = self._scalar(list(range(o, o + 1 + self.scalars)), basis, changes)
         return found
 
     # -- the answer and its faces ---------------------------------------------------------------------------------------------
@@ -200,7 +208,7 @@ class _Step:
         lines = self.s.c[:, start : start + m * (n + 1)].reshape(-1, m, n + 1)
         orders = np.broadcast_to(self._orders()[None], (len(lines), *self._orders().shape))
         normals = np.concatenate([lines[:, :, :n], orders], axis=1)
-        f = np.einsum("lij,pj->pi", normals, z) if len(normals) == 1 else np.einsum("pij,pj->pi", normals, z)
+        f = times(z[:, None, :], normals.transpose(0, 2, 1))[:, 0]
         f[:, :m] += lines[:, :, n]
         return Local(self._metric(), f, normals, np.zeros_like(z), None)
 
@@ -225,7 +233,7 @@ class _Step:
         s = self.s
         if self.update.module.METHOD == "closed":
             return self._closed_answer()
-        answer = reduced_answer(self.update.pointers, self.update.pointers.plan, s.kernel, s.eps, s.old)
+        answer = s.answer
         soft = self.reduction.soft is not None
         if self.reduction.affine:
             local = self._affine_local(answer.z)
@@ -246,7 +254,7 @@ class _Step:
 
     def _closed_answer(self) -> tuple[ReducedAnswer, Faces, Local]:
         s = self.s
-        bare = reduced_answer(None, self.plan, s.c, s.eps, s.old)
+        bare = s.answer
         region = closed_faces(self.update.pointers.plan, s.kernel, s.eps, s.old)
         local = self._affine_local(bare.trial)
         count, m = local.f.shape
@@ -408,6 +416,10 @@ class _Step:
         return de, dz
 
 
+def _trace(tensors: Array) -> Array:
+    return tensors[:, 0] + tensors[:, 1] + tensors[:, 2]
+
+
 def _affine_multipliers(local: Local, rows: list[int]) -> tuple[Array, NDArray[np.bool_]]:
     """γ of an active set from f at the trial, and where the set is independent."""
     G = local.normals[:, rows]
@@ -416,8 +428,8 @@ def _affine_multipliers(local: Local, rows: list[int]) -> tuple[Array, NDArray[n
     root = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
     unit = gram * root[:, :, None] * root[:, None, :]
     good = np.linalg.eigvalsh(unit)[:, 0] > 1e-14
-    unit = np.where(good[:, None, None], unit, np.eye(len(rows)))
-    found = np.linalg.solve(unit, (local.f[:, rows] * root)[:, :, None])[:, :, 0] * root
+    inverse = np.linalg.inv(np.where(good[:, None, None], unit, np.eye(len(rows))))
+    found = times((local.f[:, rows] * root)[:, None, :], inverse)[:, 0] * root
     return found, good
 
 
@@ -434,6 +446,7 @@ def taken(step: StepData, points: Any) -> StepData:
         at(step.kernel),
         at(step.c),
         at(step.dc),
+        step.answer.at(points),
         [at(t) for t in step.theta],
         at(step.dt),
         step.chosen,

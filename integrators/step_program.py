@@ -26,7 +26,7 @@ from .canonical import CanonicalForm, Cone, dual_cones
 from .cone_projection import SEMIDEFINITE
 from .natural_units import cleaned, natural_units
 
-__all__ = ["FlowForm", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates"]
+__all__ = ["FlowForm", "Stacked", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates", "stacked"]
 
 Array = NDArray[np.float64]
 RANK = 1e-10
@@ -94,7 +94,8 @@ def flow_of_rates(form: CanonicalForm, dt: float) -> FlowForm:
 class StepProgram:
     """Reduced program min ½ yᵀ diag(p) y + qᵀy s.t. h − Gy ∈ K, q = q0 + q1 d, h = h0 + h1 d; d = (ε, X_n, ε_n if `strain_flows`).
 
-    W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution.
+    W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution. The unknowns
+    of the stacked program are `whole` (1, d, y), its rows are divided by `units`.
     """
 
     p: Array
@@ -115,6 +116,8 @@ class StepProgram:
     state_size: int
     strain_flows: bool
     unbounded: bool
+    whole: Array
+    units: Array
 
     def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array, Array]:
         """(kinds, starts, sizes, first and second number of the cone or scalar term)."""
@@ -136,10 +139,31 @@ class StepProgram:
         return self.increment_0 + data @ self.increment_d.T + y @ self.increment_y.T
 
 
+@dataclass(frozen=True)
+class Stacked:
+    """The step before reduction: the quadratic form `full` of (1, d, x), E (1, d, x) = 0, H (1, d) − G x ∈ K, X = `X` (1, d, x)."""
+
+    full: Array
+    E: Array
+    G: Array
+    H: Array
+    cones: tuple[Cone, ...]
+    X: Array
+
+
 def assemble(
     energy: CanonicalForm, flow: FlowForm | None, moved: Sequence[int], state_size: int, strain_flows: bool
 ) -> StepProgram:
     """The step of ψ = `energy` over (ε, X, aux) with `flow` on the places `moved` of (ε, X) (ε: 0 … 5)."""
+    s = stacked(energy, flow, moved, state_size, strain_flows)
+    width = 6 + state_size + (6 if strain_flows else 0)
+    return _reduce(s.full, s.E, s.G, s.H, s.cones, s.X, width, state_size, strain_flows)
+
+
+def stacked(
+    energy: CanonicalForm, flow: FlowForm | None, moved: Sequence[int], state_size: int, strain_flows: bool
+) -> Stacked:
+    """Both forms over the common unknowns; arguments as for `assemble`."""
     m = state_size
     width = 6 + m + (6 if strain_flows else 0)
     aux = energy.q.size - energy.first
@@ -194,7 +218,7 @@ def assemble(
     full[0, :] += slope
     full[:, 0] += slope
     full[0, 0] += 2.0 * (energy.constant + (0.0 if flow is None else flow.constant))
-    return _reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows)
+    return Stacked(full, E, G, H, cones, B[6 : 6 + m])
 
 
 def _column_scale(P: Array, E: Array, G: Array) -> Array:
@@ -281,4 +305,6 @@ def _reduce(
         m,
         strain_flows,
         units.unbounded,
+        scale[:, None] * np.hstack([S, T]),
+        blocks,
     )
