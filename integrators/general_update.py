@@ -106,7 +106,7 @@ class GeneralUpdate:
         d_eps: Any = None,
         **values: Any,
     ) -> Sensitivities:
-        """See `Update.sensitivities`. `DeclarationError` for powers, exponentials and logarithms, which only reduced steps differentiate."""
+        """See `Update.sensitivities`. `DeclarationError` for powers, exponentials and logarithms: reduced steps only."""
         return sensitivities(self, eps_new, state, dt, wrt, d_state, d_eps, values)
 
     def arguments(self, values: Mapping[str, Any], count: int) -> tuple[dict[str, float], Array | None]:

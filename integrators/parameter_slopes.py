@@ -4,8 +4,8 @@
     functions(z, s, γ, θ, dt)     ∂f_i/∂θ and ∂(∇Φ + Σ γ_i ∇f_i)/∂θ at fixed reduced forces z, ∂ ln C_j/∂θ and ∂N_j/∂θ of the power
                                   terms C_j y^N_j, and ∂R/∂θ of forces R of non-linear hardening at fixed s.
 
-θ are the parameters in order, then the temperature if the law has one; the functions are also differentiated by the scalars frozen at the start
-of the step, which stand behind. The same reduction serves all methods, the closed form too: its surface is one more affine one.
+θ are the parameters in order, then the temperature if the law has one; the functions are also differentiated by the scalars frozen at the
+start of the step, which stand behind. The same reduction serves all methods, the closed form too: its surface is one more affine one.
 """
 
 from __future__ import annotations

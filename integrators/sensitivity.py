@@ -2,8 +2,8 @@
 
     σ(θ), X(θ)   with   X = argmin ψ(ε, X; θ) + φ(X − X_n; θ):     total derivatives along θ, given those of X_n and ε.
 
-By implicit differentiation of the optimality conditions at the answer of the compiled step. On a boundary between regions it is the one-sided
-derivative of the region that the step, and so its tangent, is in.
+By implicit differentiation of the optimality conditions at the answer of the compiled step. On a boundary between regions it is the
+one-sided derivative of the region that the step, and so its tangent, is in.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ BLOCK = 4096
 
 @dataclass(frozen=True)
 class Sensitivities:
-    """Derivatives at n points by the k parameters `names`, per unit of each: `stress` (n, 6, k) [Pa per unit], Mandel; `state` by name, tensors
-    (n, 6, k), scalars (n, k); `dissipation` of the step (n, k) [J/m³ per unit]."""
+    """Derivatives at n points by the k parameters `names`, per unit of each: `stress` (n, 6, k) [Pa per unit], Mandel; `state` by name,
+    tensors (n, 6, k), scalars (n, k); `dissipation` of the step (n, k) [J/m³ per unit]."""
 
     names: tuple[str, ...]
     stress: Array
@@ -135,7 +135,8 @@ def _reduced(
 ) -> tuple[Array, Array, Array]:
     from .parameter_slopes import parameter_slopes
     from .sensitivity_answer import reduced_answer
-    from .sensitivity_reduced import StepData, step_derivatives, taken
+    from .sensitivity_points import StepData, taken
+    from .sensitivity_reduced import step_derivatives
     from .update import packed_values, raise_failures
 
     n, width = len(eps), d_eps.shape[2]

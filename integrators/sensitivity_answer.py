@@ -1,7 +1,7 @@
-"""What the compiled reduced step found, before it becomes tensors: trial values, increments, reduced forces, P, and the law's functions there.
+"""What the compiled reduced step found, before it becomes tensors: trial values, increments, forces, P, and the law's functions there.
 
-The trial values and the method are those of `reduced_step` itself, called through the same pointers: derivatives that are built on its answer
-speak of the same active set. Of the closed form the region is found by its own inequalities, in its own order of operations.
+The trial values and the method are those of `reduced_step` itself, called through the same pointers: derivatives that are built on its
+answer speak of the same active set. Of the closed form the region is found by its own inequalities, in its own order of operations.
 """
 
 from __future__ import annotations

@@ -7,8 +7,8 @@ b = d(∇Φ + Σ γ_i ∇f_i), c = df_A, is answered by (Fiacco 1976, Robinson 1
 
     u = M⁻¹(H a + b),   dγ = (G W M⁻¹ Gᵀ + D⁻¹)⁻¹ (G (a − W u) + c + D⁻¹ dγ|_y),   de = u + M⁻¹ Gᵀ dγ,   dz = a − W de,
 
-D⁻¹ = dy/dγ for the power terms, zero for surfaces. No division by a modulus. The active set is the independent one whose P = ∂e/∂z^tr is the
-P of the compiled step, so that stress, tangent and sensitivity speak of one region also on a boundary.
+D⁻¹ = dy/dγ for the power terms, zero for surfaces. No division by a modulus. The active set is the independent one whose P = ∂e/∂z^tr is
+the P of the compiled step, so that stress, tangent and sensitivity speak of one region also on a boundary.
 """
 
 from __future__ import annotations
@@ -194,7 +194,7 @@ def face_slope(local: Local, rows: list[int], compliance: Array | None = None) -
 
 @dataclass(frozen=True)
 class Change:
-    """`a` (p, n, K), `b` (p, n, K), `c` (p, active, K) of the module's docstring; `compliance` D⁻¹ (p,) of the first active row, or None."""
+    """a, b (p, n, K) and c (p, active, K) of the module's docstring; `compliance` D⁻¹ (p,) of the first active row, or None."""
 
     a: Array
     b: Array
@@ -220,7 +220,7 @@ def answered(local: Local, rows: list[int], change: Change) -> tuple[Array, Arra
             gram = np.array(np.broadcast_to(gram, (len(change.compliance), *gram.shape[1:])))
             gram[:, 0, 0] += change.compliance
         right = _into(G, a - _into(metric, u)) + change.c
-        de = u + _into(turned, _into(np.linalg.inv(gram), right))
+        de = u + _into(turned, _into(np.asarray(np.linalg.inv(gram), dtype=float), right))
     return de, a - _into(metric, de)
 
 

@@ -29,8 +29,8 @@ LIMIT = 1e-10
 
 @dataclass(frozen=True)
 class PathSensitivities:
-    """Derivatives by the k parameters `names` at the n rows of `history`, per unit of each: `eps` [1/unit], `sig` [Pa/unit] (n, 6, k), Mandel;
-    `state` by name, tensors (n, 6, k), scalars (n, k); `dissipation`, accumulated [J/m³ per unit] (n, k)."""
+    """Derivatives by the k parameters `names` at the n rows of `history`, per unit of each: `eps` [1/unit], `sig` [Pa/unit] (n, 6, k),
+    Mandel; `state` by name, tensors (n, 6, k), scalars (n, k); `dissipation`, accumulated [J/m³ per unit] (n, k)."""
 
     names: tuple[str, ...]
     eps: Array

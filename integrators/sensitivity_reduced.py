@@ -6,7 +6,7 @@ kind 1, dB in the frame of B:        (dF)_ii = de_i,  (dF)_ij = (e_i − e_j)/(b
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -15,13 +15,11 @@ from numpy.typing import NDArray
 from .parameter_slopes import FunctionSlopes, ParameterSlopes
 from .plan import (
     FIRST_SCALAR,
-    FROZEN,
     KIND,
     LINES,
     METRIC,
     MOVING,
     NORM,
-    PLACES,
     SCALAR_START,
     SCALARS,
     STRAIN_START,
@@ -30,42 +28,15 @@ from .plan import (
     TRACES,
     UNKNOWNS,
 )
-from .sensitivity_answer import ReducedAnswer, closed_faces, function_values
-from .sensitivity_faces import (
-    Change,
-    Faces,
-    Local,
-    answered,
-    face_slope,
-    find_faces,
-    power_compliance,
-    times,
-)
+from .sensitivity_answer import ReducedAnswer
+from .sensitivity_faces import Change, Faces, Local, answered, power_compliance, times
+from .sensitivity_points import SolvedPoints, StepData
 from .sensitivity_strain import add_declared_energy, add_unilateral_energies
 
-__all__ = ["StepData", "step_derivatives", "taken"]
+__all__ = ["step_derivatives"]
 
 Array = NDArray[np.float64]
 _PAIRS = ((0, 0), (1, 1), (2, 2), (1, 2), (0, 2), (0, 1))
-
-
-@dataclass(frozen=True)
-class StepData:
-    """Points of a step: strains (p, 6), packed old and new states, `kernel` coefficients of the compiled step, `c` (L, N) and `dc`
-    (L, N, K) of `parameter_slopes`, the `answer` of the method (of a closed form the trial only), values of θ (numbers or (p,)), dt, which θ the first columns are, d_old (p, size, K), d_eps (p, 6, K)."""
-
-    eps: Array
-    old: Array
-    new: Array
-    kernel: Array
-    c: Array
-    dc: Array
-    answer: ReducedAnswer
-    theta: list[Any]
-    dt: Any
-    chosen: list[int]
-    d_old: Array
-    d_eps: Array
 
 
 def step_derivatives(update: Any, slopes: ParameterSlopes, step: StepData) -> tuple[Array, Array, Array]:
@@ -75,22 +46,20 @@ def step_derivatives(update: Any, slopes: ParameterSlopes, step: StepData) -> tu
 
 class _Step:
     def __init__(self, update: Any, slopes: ParameterSlopes, step: StepData) -> None:
-        self.update, self.slopes, self.s = update, slopes, step
+        self.slopes, self.s = slopes, step
         self.plan = np.array(slopes.plan, dtype=np.int64)
         p = slopes.plan
-        self.tensors, self.scalars, self.moving, self.frozen = p[TENSORS], p[SCALARS], p[MOVING], p[FROZEN]
+        self.tensors, self.scalars, self.moving = p[TENSORS], p[SCALARS], p[MOVING]
         self.n, self.traces, self.norm, self.first = p[UNKNOWNS], p[TRACES], p[NORM], p[FIRST_SCALAR]
-        self.places = p[PLACES : PLACES + self.tensors]
-        after = PLACES + self.tensors
-        self.scalar_places = list(p[after : after + self.scalars])
-        self.moving_places = list(p[after + self.scalars : after + self.scalars + self.moving])
-        self.frozen_places = list(p[after + self.scalars + self.moving :])
+        self.points = SolvedPoints(update, slopes, step)
+        self.places, self.scalar_places = self.points.tensor_places, self.points.scalar_places
+        self.moving_places, self.frozen_places = self.points.moving_places, self.points.frozen_places
         self.reduction = slopes.reduction
         self.quadratic = self.reduction.moduli.quadratic
         self.width = step.d_eps.shape[2]
         self.old_moves = bool(step.d_old.any())
         self.strain_moves = bool(step.d_eps.any())
-        self.live = step.dc.any(axis=(0, 2))
+        self.live = np.asarray(step.dc.any(axis=(0, 2)))
 
     # -- linear maps of coefficients ----------------------------------------------------------------------------------------
 
@@ -148,7 +117,7 @@ class _Step:
         lost = np.zeros((count, self.width))
         if self.n:
             d_base = self._tensor(base_pairs, 5, old_vectors, old_changes)
-            answer, faces, local = self._answer()
+            answer, faces, local = self.points.answer()
             if self.plan[KIND] == 0:
                 d_base[:, :3] -= _trace(d_base)[:, None, :] / 3.0
                 de, dz = self._norm_flow(answer, faces, local, d_base, d_new)
@@ -194,119 +163,26 @@ class _Step:
             found[:, self.first + j] = self._scalar(list(range(o, o + 1 + self.scalars)), basis, changes)
         return found
 
-    # -- the answer and its faces ---------------------------------------------------------------------------------------------
-
-    def _orders(self) -> Array:
-        return np.array(self.reduction.order_rows, dtype=float).reshape(-1, self.n)
-
-    def _metric(self) -> Array:
-        start = int(self.plan[METRIC])
-        return self.s.c[:, start : start + self.n * self.n].reshape(-1, self.n, self.n)
-
-    def _affine_local(self, z: Array) -> Local:
-        m, n, start = len(self.reduction.surfaces), self.n, int(self.plan[LINES])
-        lines = self.s.c[:, start : start + m * (n + 1)].reshape(-1, m, n + 1)
-        orders = np.broadcast_to(self._orders()[None], (len(lines), *self._orders().shape))
-        normals = np.concatenate([lines[:, :, :n], orders], axis=1)
-        f = times(z[:, None, :], normals.transpose(0, 2, 1))[:, 0]
-        f[:, :m] += lines[:, :, n]
-        return Local(self._metric(), f, normals, np.zeros_like(z), None)
-
-    def _curved_local(self, z: Array, gamma: Array) -> Local:
-        """Functions at z; γ is that of the surfaces and orders."""
-        data = self._data_at_end()
-        m = len(self.reduction.functions)
-        pointers = self.update.pointers
-        f, g, flow, hessian, block = function_values(pointers.law, self.plan, z, data, gamma[:, :m], self.s.kernel)
-        orders = self._orders()
-        normals = np.concatenate([g, np.broadcast_to(orders, (len(z), *orders.shape))], axis=1)
-        metric = np.array(np.broadcast_to(self._metric(), (len(z), self.n, self.n)))
-        if not self.quadratic:
-            metric[:, self.first :, self.first :] = block
-        return Local(metric, np.concatenate([f, z @ orders.T], axis=1), normals, flow, hessian)
-
-    def _data_at_end(self) -> Array:
-        """Moving scalars at the end of the step, frozen ones at its start."""
-        return np.hstack([self.s.new[:, self.moving_places], self.s.old[:, self.frozen_places]])
-
-    def _answer(self) -> tuple[ReducedAnswer, Faces, Local]:
-        s = self.s
-        if self.update.module.METHOD == "closed":
-            return self._closed_answer()
-        answer = s.answer
-        soft = self.reduction.soft is not None
-        if self.reduction.affine:
-            local = self._affine_local(answer.z)
-            return answer, find_faces(local, answer, False, False, lambda points, gamma: (None, None)), local
-        m = len(self.reduction.functions) + len(self.reduction.order_rows)
-        local = self._curved_local(answer.z, np.zeros((len(answer.z), m)))
-
-        def bend(points: Any, gamma: Array) -> tuple[Array, Array | None]:
-            part = _Step(self.update, self.slopes, taken(s, points))
-            hessian = part._curved_local(answer.z[points], gamma).hessian
-            assert hessian is not None
-            if not soft or not (gamma[:, 0] > 0.0).all():
-                return hessian, None
-            return hessian, power_compliance(gamma[:, 0], part._functions(answer.z[points], gamma))[0]
-
-        faces = find_faces(local, answer, self.reduction.finite != 0, soft, bend)
-        return answer, faces, self._curved_local(answer.z, faces.gamma)
-
-    def _closed_answer(self) -> tuple[ReducedAnswer, Faces, Local]:
-        s = self.s
-        bare = s.answer
-        region = closed_faces(self.update.pointers.plan, s.kernel, s.eps, s.old)
-        local = self._affine_local(bare.trial)
-        count, m = local.f.shape
-        e, z, gamma = np.zeros_like(bare.trial), bare.trial.copy(), np.zeros((count, m))
-        slope = np.zeros((count, self.n, self.n))
-        members: list[tuple[int, ...]] = []
-        groups: list[NDArray[np.int64]] = []
-        for number in np.unique(region):
-            rows = [[], [0], [0, 1]][int(number)]
-            points = np.flatnonzero(region == number)
-            here = local.at(points)
-            if rows:
-                found, good = _affine_multipliers(here, rows)
-                if not good.all():
-                    # an apex that no modulus but that of the norm holds: a cohesion of zero
-                    rows = [0]
-                    found, _ = _affine_multipliers(here, rows)
-                gamma[np.ix_(points, rows)] = found
-                e[points] = np.einsum(
-                    "pi,pij->pj", found, np.broadcast_to(here.normals, (len(points), m, self.n))[:, rows]
-                )
-                z[points] -= times(e[points][:, None, :], here.metric)[:, 0]
-                slope[points] = face_slope(here, rows)
-            members.append(tuple(rows))
-            groups.append(points)
-        answer = replace(bare, e=e, z=z, slope=slope)
-        return answer, Faces(members, groups, gamma), local
-
-    def _functions(self, z: Array, gamma: Array) -> FunctionSlopes:
-        m = len(self.reduction.functions)
-        return self.slopes.functions(z, self._data_at_end(), gamma[:, :m], self.s.theta, self.s.dt)
-
     def _respond(self, answer: ReducedAnswer, faces: Faces, local: Local, d_trial: Array) -> tuple[Array, Array]:
         """(de, dz) at all points from dz^tr."""
         s, n = self.s, self.n
         count = len(answer.z)
         a = d_trial.copy()
         start = int(self.plan[METRIC])
-        d_metric = s.dc[:, start : start + n * n].reshape(-1, n, n * self.width)
+        d_metric = s.dc[:, start : start + n * n].reshape(len(s.dc), n, n * self.width)
         a -= times(answer.e[:, None, :], d_metric).reshape(count, n, self.width)
         m = len(local.f[0])
         b, c = np.zeros((count, n, self.width)), np.zeros((count, m, self.width))
         slopes: FunctionSlopes | None = None
         if self.reduction.affine:
             surfaces, lines = len(self.reduction.surfaces), int(self.plan[LINES])
-            d_lines = s.dc[:, lines : lines + surfaces * (n + 1)].reshape(-1, surfaces, n + 1, self.width)
+            d_lines = s.dc[:, lines : lines + surfaces * (n + 1)].reshape(len(s.dc), surfaces, n + 1, self.width)
             for i in range(surfaces):
                 if d_lines[:, i].any():
                     b += faces.gamma[:, i, None, None] * d_lines[:, i, :n]
                     c[:, i] = times(answer.z[:, None, :], d_lines[:, i, :n])[:, 0] + d_lines[:, i, n]
         else:
-            slopes = self._functions(answer.z, faces.gamma)
+            slopes = self.points.functions(answer.z, faces.gamma)
             b = self._chained(slopes.gradient)
             c[:, : len(self.reduction.functions)] = self._chained(slopes.surfaces)
             if not self.quadratic:
@@ -359,7 +235,7 @@ class _Step:
             clear = (q > size) & (np.abs(e_q) < 1e280 * q)
             safe = np.where(clear, q, 1.0)
             slip = np.where(clear, e_q / safe, answer.slope[:, 0, 0])
-            modulus = self._metric()[:, 0, 0]
+            modulus = self.points.metric()[:, 0, 0]
             slip = np.where(modulus > 0.0, np.clip(slip, 0.0, 1.0 / np.where(modulus > 0.0, modulus, 1.0)), slip)
             normal = np.where(clear[:, None], answer.b / safe[:, None], 0.0)
             d_head = np.matmul(normal[:, None, :], d_base)
@@ -418,38 +294,3 @@ class _Step:
 
 def _trace(tensors: Array) -> Array:
     return tensors[:, 0] + tensors[:, 1] + tensors[:, 2]
-
-
-def _affine_multipliers(local: Local, rows: list[int]) -> tuple[Array, NDArray[np.bool_]]:
-    """γ of an active set from f at the trial, and where the set is independent."""
-    G = local.normals[:, rows]
-    gram = G @ local.metric @ G.transpose(0, 2, 1)
-    diagonal = np.diagonal(gram, axis1=1, axis2=2)
-    root = 1.0 / np.sqrt(np.where(diagonal > 0.0, diagonal, np.inf))
-    unit = gram * root[:, :, None] * root[:, None, :]
-    good = np.linalg.eigvalsh(unit)[:, 0] > 1e-14
-    inverse = np.linalg.inv(np.where(good[:, None, None], unit, np.eye(len(rows))))
-    found = times((local.f[:, rows] * root)[:, None, :], inverse)[:, 0] * root
-    return found, good
-
-
-def taken(step: StepData, points: Any) -> StepData:
-    """The step at some of its points."""
-
-    def at(value: Any) -> Any:
-        return value[points] if isinstance(value, np.ndarray) and value.ndim and value.shape[0] > 1 else value
-
-    return StepData(
-        step.eps[points],
-        step.old[points],
-        step.new[points],
-        at(step.kernel),
-        at(step.c),
-        at(step.dc),
-        step.answer.at(points),
-        [at(t) for t in step.theta],
-        at(step.dt),
-        step.chosen,
-        step.d_old[points],
-        step.d_eps[points],
-    )
