@@ -6,6 +6,8 @@ from .driver import drive
 from .history import History, drive_arrays
 from .module_store import module_source
 from .path_file import StrainStressPath, read_path, write_history
+from .sensitivity import Sensitivities
+from .sensitivity_path import PathSensitivities, path_sensitivities
 from .stress_update import StressUpdate
 from .update import StepResult, Update, build_update
 
@@ -14,6 +16,8 @@ __all__ = [
     "ConicStep",
     "ConvergenceError",
     "History",
+    "PathSensitivities",
+    "Sensitivities",
     "StepResult",
     "StrainStressPath",
     "StressUpdate",
@@ -23,6 +27,7 @@ __all__ = [
     "drive",
     "drive_arrays",
     "module_source",
+    "path_sensitivities",
     "read_path",
     "write_history",
 ]

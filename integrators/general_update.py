@@ -7,7 +7,7 @@ the observable's name. The dissipation of the step is Y·(X − X_n) + σ^ir:(ε
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -20,6 +20,7 @@ from ..potentials.evaluate import evaluate
 from .declared import DeclaredStep, components, declared_step
 from .general_step import GeneralStep, StepSolution
 from .packing import StatePacking
+from .sensitivity import Sensitivities, sensitivities
 from .thermal import thermal_input, thermal_results
 
 __all__ = ["GeneralUpdate"]
@@ -121,6 +122,20 @@ class GeneralUpdate:
         if not self.turned:
             return found.slopes[:, :6].copy(), found.tangent
         return -found.slopes[:, :6], None if found.tangent is None else -found.tangent
+
+    def sensitivities(
+        self,
+        eps_new: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        wrt: Sequence[str] | str | None = None,
+        d_state: Mapping[str, Any] | None = None,
+        d_eps: Any = None,
+        **values: Any,
+    ) -> Sensitivities:
+        """See `Update.sensitivities`. `DeclarationError` for powers, exponentials and logarithms: reduced steps only."""
+        return sensitivities(self, eps_new, state, dt, wrt, d_state, d_eps, values)
 
     def arguments(self, values: Mapping[str, Any], count: int) -> tuple[dict[str, float], Array | None]:
         """Checked parameters by name, and the temperature at every point."""

@@ -28,7 +28,7 @@ from .canonical import CanonicalForm, Cone, dual_cones
 from .cone_projection import SEMIDEFINITE
 from .natural_units import cleaned, natural_units
 
-__all__ = ["FlowForm", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates"]
+__all__ = ["FlowForm", "Stacked", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates", "stacked"]
 
 Array = NDArray[np.float64]
 RANK = 1e-10
@@ -97,7 +97,8 @@ class StepProgram:
     """Reduced program min ½ yᵀ diag(p) y + qᵀy s.t. h − Gy ∈ K, q = q0 + q1 d, h = h0 + h1 d; d = (ε, X_n, ε_n if `strain_flows`),
     with σ in place of ε if `stress`.
 
-    W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution.
+    W = value + ½ dᵀCd + c1·d; X = X_n + `increment`; `misfit` rows must vanish for the equalities to have a solution. The unknowns
+    of the stacked program are `whole` (1, d, y), its rows are divided by `units`.
     """
 
     p: Array
@@ -118,6 +119,8 @@ class StepProgram:
     state_size: int
     strain_flows: bool
     unbounded: bool
+    whole: Array
+    units: Array
     stress: bool = False
 
     def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array, Array]:
@@ -147,6 +150,18 @@ class StepProgram:
         return self.increment_0 + data @ self.increment_d.T + y @ self.increment_y.T
 
 
+@dataclass(frozen=True)
+class Stacked:
+    """The step before reduction: the quadratic form `full` of (1, d, x), E (1, d, x) = 0, H (1, d) − G x ∈ K, X = `X` (1, d, x)."""
+
+    full: Array
+    E: Array
+    G: Array
+    H: Array
+    cones: tuple[Cone, ...]
+    X: Array
+
+
 def assemble(
     energy: CanonicalForm,
     flow: FlowForm | None,
@@ -156,6 +171,20 @@ def assemble(
     stress: bool = False,
 ) -> StepProgram:
     """The step of ψ = `energy` over (ε, X, aux) with `flow` on the places `moved` of (ε, X) (ε: 0 … 5); driven by σ if `stress`."""
+    s = stacked(energy, flow, moved, state_size, strain_flows, stress)
+    width = 6 + state_size + (6 if strain_flows else 0)
+    return replace(_reduce(s.full, s.E, s.G, s.H, s.cones, s.X, width, state_size, strain_flows), stress=stress)
+
+
+def stacked(
+    energy: CanonicalForm,
+    flow: FlowForm | None,
+    moved: Sequence[int],
+    state_size: int,
+    strain_flows: bool,
+    stress: bool = False,
+) -> Stacked:
+    """Both forms over the common unknowns; arguments as for `assemble`."""
     m = state_size
     width = 6 + m + (6 if strain_flows else 0)
     aux = energy.q.size - energy.first
@@ -217,7 +246,7 @@ def assemble(
     if stress:
         full[1:7, strain] -= np.eye(6)
         full[strain, 1:7] -= np.eye(6)
-    return replace(_reduce(full, E, G, H, cones, B[6 : 6 + m], width, m, strain_flows), stress=stress)
+    return Stacked(full, E, G, H, cones, B[6 : 6 + m])
 
 
 def _column_scale(P: Array, E: Array, G: Array) -> Array:
@@ -304,4 +333,6 @@ def _reduce(
         m,
         strain_flows,
         units.unbounded,
+        scale[:, None] * np.hstack([S, T]),
+        blocks,
     )

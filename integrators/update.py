@@ -7,7 +7,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from types import ModuleType
@@ -26,6 +26,7 @@ from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
 from .points import run_points
 from .relaxed import Evaluation, condensed, relax
+from .sensitivity import Sensitivities, sensitivities
 from .structure import NoReduction
 from .thermal import ThermalData, thermal_input, thermal_results
 from .threads import checked_threads
@@ -173,6 +174,24 @@ class Update:
         new, lost = found.rest
         tangent = condensed(found.tangent, self.dimension.given, relaxed) if self.tangent else None
         return eps, (new, found.stress[:, given], tangent, lost, found.status)
+
+    def sensitivities(
+        self,
+        eps_new: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        wrt: Sequence[str] | str | None = None,
+        d_state: Mapping[str, Any] | None = None,
+        d_eps: Any = None,
+        **values: Any,
+    ) -> Sensitivities:
+        """Exact derivatives of the step by parameters, arguments as for the step itself.
+
+        `wrt` names k parameters (all of them, in order, if None; the temperature may be among them); `d_state` by name, (n, …, k), and
+        `d_eps` (n, 6, k) are the derivatives of the old state and of the strain, zero if not given. Raises as the step does.
+        """
+        return sensitivities(self, eps_new, state, dt, wrt, d_state, d_eps, values)
 
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
         """Free energy ρψ [J/m³] at strains (all components of the dimension) and internal variables, shape (n,)."""
