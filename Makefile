@@ -1,9 +1,11 @@
 # Everything starts here: `make demo` and `make test` need Python (3.11 to 3.14) and make, nothing else.
-# PYTHON=... chooses the interpreter, OUT=... the folder of the demo, SECONDS=... how long to fuzz.
+# PYTHON=... chooses the interpreter, OUT=... the folder of the demo, SECONDS=... how long to fuzz, JOBS=... how many
+# processes share the tests.
 
 PYTHON ?= python3 python3.13 python3.12 python3.11 python3.14
 OUT ?= demo
 SECONDS := 60
+JOBS := 2
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --disable-pip-version-check --no-input
@@ -26,7 +28,7 @@ demo: setup
 setup: $(PROJECT)
 
 test: $(PROJECT) $(VENV)/.test
-	$(BIN)/python -m pytest -q -m "not validate"
+	$(BIN)/python -m pytest -q -n $(JOBS) --dist loadfile -m "not validate"
 
 lint: $(PROJECT) $(VENV)/.test $(VENV)/.lint
 	$(BIN)/ruff check .
