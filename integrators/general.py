@@ -44,9 +44,7 @@ _DELTA = 1e-8
 _TURNS = 60
 
 # unknowns: y0, trial, slope, direction, kept_y, one, two; rows: v, w, image, v_next, kept_l, spread, more
-Room = namedtuple(
-    "Room", "y0 trial slope direction kept_y one two v w image v_next kept_l spread more matrix"
-)
+Room = namedtuple("Room", "y0 trial slope direction kept_y one two v w image v_next kept_l spread more matrix")
 
 
 @njit(folder=_FOLDER, nogil=True, fastmath=FAST)
@@ -152,7 +150,7 @@ def _steep_power(c, k, lam, s):
 
 @njit(folder=_FOLDER, nogil=True)
 def _has_steep(cones, betas):
-    for b in range(cones.kinds.size):
+    for b in range(cones.kinds.size):  # noqa: SIM110
         if cones.kinds[b] == POWER_TERM and betas[b] < 2.0:
             return True
     return False
@@ -459,8 +457,8 @@ def solve_points(
 ):  # fmt: skip
     """The program at every row d of `data` (N, D).
 
-    `y_all` (N, n), `l_all` (N, m) take the solutions and hold the start where `warm`; else it is y = 0, λ = `guess` q. `slopes` (N, D) takes
-    ∂W/∂d = C d + c₁ + q₁ᵀy − h₁ᵀλ, `tangents` (N, 6, 6) its derivative by the first six data. `residuals` are relative to the size
+    `y_all` (N, n), `l_all` (N, m) take the solutions and hold the start where `warm`; else it is y = 0, λ = `guess` q. `slopes` (N, D)
+    takes ∂W/∂d = C d + c₁ + q₁ᵀy − h₁ᵀλ, `tangents` (N, 6, 6) its derivative by the first six data. `residuals` are relative to the size
     of (q, h), `counts` Newton steps and `turns` outer turns. `q1t`, `h1t` are transposed.
     """
     n, m, width = p.size, h0.size, data.shape[1]
