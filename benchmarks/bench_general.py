@@ -229,7 +229,8 @@ def main() -> None:
             f"{name:18s} unknowns {found.y.shape[1]:2d} rows {found.multipliers.shape[1]:2d}  "
             f"with tangent {given.points / with_tangent / 1e3:7.1f} k/s  without {given.points / without / 1e3:7.1f} k/s  "
             f"flowing {flows.mean():.2f}  newton {found.counts.mean():5.2f} (most {found.counts.max()})  "
-            f"turns {found.turns.mean():4.2f}  again {100 * (found.attempts > 1).mean():.3f} %  failed {(found.status > 1).sum()}  residual {found.residual.max():.0e}"
+            f"turns {found.turns.mean():4.2f}  again {100 * (found.attempts > 1).mean():.3f} %  "
+            f"failed {(found.status > 1).sum()}  residual {found.residual.max():.0e}"
         )
 
 

@@ -31,7 +31,8 @@ NOISE = 1e-12
 
 @dataclass(frozen=True)
 class Compact:
-    """`program` with scalar terms, and the maps `unknowns` (n′, n), `rows` (m′, m) of the conic program's unknowns and multipliers to its own."""
+    """`program` with scalar terms, and the maps `unknowns` (n′, n), `rows` (m′, m) of the conic program's unknowns and multipliers to
+    its own."""
 
     program: StepProgram
     unknowns: NDArray[np.float64]
@@ -175,8 +176,8 @@ def _weights(row: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[n
 
 
 def _useful_unknowns(program: StepProgram) -> NDArray[np.float64]:
-    """Orthonormal columns B, y = B y′: all unknowns but directions without cost and effect that lie in the w of one second-order cone, square
-    to all else that w can be. They could only lengthen w, so that zero is right for them."""
+    """Orthonormal columns B, y = B y′: all unknowns but directions without cost and effect that lie in the w of one second-order cone,
+    square to all else that w can be. They could only lengthen w, so that zero is right for them."""
     idle = program.p == 0.0
     for effect in (program.q0[:, None], program.q1, program.increment_y.T):
         size = np.abs(effect).max(axis=1, initial=0.0)

@@ -1,7 +1,7 @@
 """All cones of a program together: projection, its generalised Jacobian V as a spectrum per block, and GᵀF(V)G for functions F of it.
 
-A second-order block has the eigenvalues 1, 0 and r, a semidefinite block six with their tensors, so that GᵀF(V)G is a few updates of rank one
-to the Gram matrix of the block, which is made once per program. Three functions are needed:
+A second-order block has the eigenvalues 1, 0 and r, a semidefinite block six with their tensors, so that GᵀF(V)G is a few updates of
+rank one to the Gram matrix of the block, which is made once per program. Three functions are needed:
 
     PENALTY  τ e                           of the augmented Lagrangian,
     SLOPE    τ e / (1 + δ − e)             of the optimality system with its multipliers eliminated, and

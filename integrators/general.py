@@ -142,13 +142,15 @@ def _steep_power(c, k, lam, s):
         bend = max(bend, c * k * (k - 1.0) * abs(s) ** (k - 2.0))
     t = min(max(100.0 * bend, 1.0), 1e12)
     w, e, _ = proximal_step(POWER_TERM, c, k, lam - t * s, t)
+    if not e < 1.0:
+        return (w - lam) / t, 1.0
     bend = t * e / (1.0 - e)
     return (w - lam) * (1.0 + bend / t) / (1.0 + bend), bend / (1.0 + bend)
 
 
 @njit(folder=_FOLDER, nogil=True)
 def _has_steep(cones, betas):
-    for b in range(cones.kinds.size):
+    for b in range(cones.kinds.size):  # noqa: SIM110
         if cones.kinds[b] == POWER_TERM and betas[b] < 2.0:
             return True
     return False
@@ -364,13 +366,17 @@ def _derivatives(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room
             apply(cones, jacobian, v, PENALTY, 1.0, 0.0, second, room.image)
             for r in range(m):
                 second[r] = room.image[r]
-        last = math.inf
-        for _ in range(20):
+        last, size = math.inf, goal
+        for turn in range(20):
             _kkt_step(cones, v, first, second, step_y, step_l, room, jacobian)
             for i in range(n):
                 dy[i] += step_y[i]
             for r in range(m):
                 dl[r] += step_l[r]
+            # the second step repeats what the first has gained
+            if turn == 1 and size * size <= 1e-14 * goal * goal:
+                last = size * size / goal
+                break
             # what is left: −q₁ − p dy − Gᵀdλ, and V(dλ + G dy − h₁) − dλ
             for i in range(n):
                 first[i] = 0.0
@@ -384,7 +390,7 @@ def _derivatives(p, cones, q1t, h1t, h1_zero, C, v, dy, dl, step_y, step_l, room
             for r in range(m):
                 second[r] -= dl[r]
             size = max(_largest(first), _largest(second))
-            if size <= 1e-14 * goal or not size < 0.5 * last:
+            if size <= 1e-13 * goal or not size < 0.5 * last:
                 break
             last = size
         worst = max(worst, min(size, last) / goal)
@@ -451,8 +457,8 @@ def solve_points(
 ):  # fmt: skip
     """The program at every row d of `data` (N, D).
 
-    `y_all` (N, n), `l_all` (N, m) take the solutions and hold the start where `warm`; else it is y = 0, λ = `guess` q. `slopes` (N, D) takes
-    ∂W/∂d = C d + c₁ + q₁ᵀy − h₁ᵀλ, `tangents` (N, 6, 6) its derivative by the first six data. `residuals` are relative to the size
+    `y_all` (N, n), `l_all` (N, m) take the solutions and hold the start where `warm`; else it is y = 0, λ = `guess` q. `slopes` (N, D)
+    takes ∂W/∂d = C d + c₁ + q₁ᵀy − h₁ᵀλ, `tangents` (N, 6, 6) its derivative by the first six data. `residuals` are relative to the size
     of (q, h), `counts` Newton steps and `turns` outer turns. `q1t`, `h1t` are transposed.
     """
     n, m, width = p.size, h0.size, data.shape[1]
