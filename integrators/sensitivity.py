@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .plan import STRAIN
 from .thermal import thermal_input
 
 __all__ = ["Sensitivities", "chosen_names", "derivative_rows", "sensitivities"]
@@ -139,6 +140,11 @@ def _reduced(
     from .sensitivity_reduced import step_derivatives
     from .update import packed_values, raise_failures
 
+    closed = update.module.METHOD == "closed"
+    if update.module.PLAN[2 if closed else STRAIN] < 0:
+        raise InputError(
+            f"law '{update.law.name}': sensitivities are those of the strain formulation; build the update for it"
+        )
     n, width = len(eps), d_eps.shape[2]
     heat, given = thermal_input(update.law, values, n)
     parameters = packed_values(update, given)
@@ -157,7 +163,7 @@ def _reduced(
     chosen = [slopes.names.index(name) for name in names]
     dc = np.zeros((*c.shape, width))
     dc[:, :, : len(chosen)] = all_slopes[:, :, chosen]
-    if update.module.METHOD == "closed":
+    if closed:
         answer = reduced_answer(None, np.array(slopes.plan, dtype=np.int64), c, eps, old)
     else:
         answer = reduced_answer(pointers, pointers.plan, kernel, eps, old)

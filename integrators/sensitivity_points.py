@@ -122,9 +122,11 @@ class SolvedPoints:
         slope = np.zeros((count, self.n, self.n))
         members: list[tuple[int, ...]] = []
         groups: list[NDArray[np.int64]] = []
-        for number in np.unique(region):
-            rows: list[int] = [[], [0], [0, 1]][int(number)]
+        for number, active in enumerate(([], [0], [0, 1])):
+            rows: list[int] = list(active)
             points = np.flatnonzero(region == number)
+            if not points.size:
+                continue
             here = local.at(points)
             if rows:
                 found, good = _affine_multipliers(here, rows)
