@@ -122,6 +122,7 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
         stage, tried, done, turn = 0, False, False, 0
         slip, gamma, d_slip, d_gamma = 0.0, 0.0, 0.0, 0.0
         fresh, frozen = True, False
+        k0, k1, k2, open_ = False, False, False, False
         n_01, n_02, n_12, v0, v1, v2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         flag = 0
         c, w, wi, wj, beta, D, g_b, g_i, g_ii, q = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
@@ -168,8 +169,15 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
                 fresh = False
                 v0, v1, v2 = frame[0], frame[1], frame[2]
             frame[0], frame[1], frame[2] = v0 + ball, v1 + ball, v2 + ball
-            P, T, k0, k1, k2, beta, D = principal_solution(frame[0], frame[1], frame[2], alpha, beta, me, e0, mt, t0)
-            l, i, j, c, p, d, w, wi, wj = local_inverse(full, frame, alpha, me, e0, P, k0, k1, k2)
+            low, high = 1.0 / alpha, 1.0 / (alpha + me)
+            if stage == 0:
+                open_ = v0 + v1 + v2 > 0.0
+                P = beta * (v0 + v1 + v2) / (alpha + 3.0 * beta)
+                k0, k1, k2 = v0 > P, v1 > P, v2 > P
+            P, T, k0, k1, k2, open_, beta, D = principal_solution(
+                frame[0], frame[1], frame[2], low, high, beta, me * e0, e0, mt, t0, k0, k1, k2, open_
+            )
+            l, i, j, c, p, d, w, wi, wj = local_inverse(frame, low, high, alpha, me, e0, P, k0, k1, k2)
             n0, n1, n2 = frame[3 + l], frame[6 + l], frame[9 + l]
             sphere, lone = p, d
             p -= ball
@@ -260,7 +268,7 @@ def _step(method, law, rest, sig, old, new, strain_out, compliance, want, dissip
             near = 2e-7 * h * gamma + noise
             if not frozen and h * abs(d_gamma) <= near and h * q * abs(d_slip) <= a * near:
                 # what is left is added by its first order, if it meets no kink on its way, or is rounding
-                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) / alpha
+                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) * low
                 gap = min(abs(T + t0), abs(c * (frame[l] - sphere) + lone + e0))
                 gap = min(gap, abs(c * (frame[i] - sphere) + e0), abs(c * (frame[j] - sphere) + e0))
                 if far <= 1e-6 * gap or (h * abs(d_gamma) <= noise and h * q * abs(d_slip) <= a * noise):

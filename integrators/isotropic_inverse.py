@@ -23,14 +23,10 @@ _FOLDER = kernels_hash()
 
 
 @njit(folder=_FOLDER)
-def principal_solution(r0, r1, r2, alpha, beta, m, e0, mt, t0):
-    """Scalar equation in principal values: (mean part P, tr ε, which ε_i + e₀ are positive, β with the trace term, 1 + β Σ 1/α_i)."""
-    low, high = 1.0 / alpha, 1.0 / (alpha + m)
-    shift = m * e0
-    open_ = r0 + r1 + r2 > 0.0
-    P = beta * (r0 + r1 + r2) / (alpha + 3.0 * beta)
-    k0, k1, k2 = r0 - P > 0.0, r1 - P > 0.0, r2 - P > 0.0
-    T, b, D = 0.0, beta, 1.0
+def principal_solution(r0, r1, r2, low, high, beta, shift, e0, mt, t0, k0, k1, k2, open_):
+    """Scalar equation in principal values, `low` = 1/α, `high` = 1/(α + m), `shift` = m e₀, begun with a guess of which ε_i + e₀ (k) and
+    whether tr ε + t₀ (`open_`) are positive: returns the mean part P, tr ε, these signs, β with the trace term, and D = 1 + β Σ 1/α_i."""
+    P, T, b, D = 0.0, 0.0, beta, 1.0
     for _ in range(12):
         b, base = (beta + mt, mt * t0) if open_ else (beta, 0.0)
         w0, w1, w2 = high if k0 else low, high if k1 else low, high if k2 else low
@@ -45,14 +41,13 @@ def principal_solution(r0, r1, r2, alpha, beta, m, e0, mt, t0):
         if n0 == k0 and n1 == k1 and n2 == k2 and next_ == open_:
             break
         k0, k1, k2, open_ = n0, n1, n2, next_
-    return P, T, k0, k1, k2, b, D
+    return P, T, k0, k1, k2, open_, b, D
 
 
 @njit(folder=_FOLDER)
-def local_inverse(r, frame, alpha, m, e0, P, k0, k1, k2):
+def local_inverse(r, low, high, alpha, m, e0, P, k0, k1, k2):
     """The inverse of the map at its solution: ε = c (r − p I) + d n⊗n, and its derivative c 𝕀 + w n⊗n + w₁ d₁⊗d₁ + w₂ d₂⊗d₂ beside
-    the spherical part; n the axis whose sign stands alone, first of the places (l, i, j)."""
-    low, high = 1.0 / alpha, 1.0 / (alpha + m)
+    the spherical part; n the axis whose sign stands alone, first of the places (l, i, j). Returns l, i, j, c, p, d, w, w₁, w₂."""
     count = int(k0) + int(k1) + int(k2)
     if count == 0:
         return 0, 1, 2, low, P, 0.0, 0.0, 0.0, 0.0
@@ -61,21 +56,21 @@ def local_inverse(r, frame, alpha, m, e0, P, k0, k1, k2):
         return 0, 1, 2, high, P + shift, 0.0, 0.0, 0.0, 0.0
     if count == 1:
         l = 0 if k0 else 1 if k1 else 2
-        c, p = low, P
-        lone = (frame[l] - P - shift) * high
+        c, p, w = low, P, high - low
+        lone = (r[l] - P - shift) * high
     else:
         l = 2 if not k2 else 1 if not k1 else 0
-        c, p = high, P + shift
-        lone = (frame[l] - P) * low
+        c, p, w = high, P + shift, low - high
+        lone = (r[l] - P) * low
     i, j = (l + 1) % 3, (l + 2) % 3
-    ei, ej = c * (frame[i] - p), c * (frame[j] - p)
+    ei, ej = c * (r[i] - p), c * (r[j] - p)
+    # of a pair of axes the stiffness is α + m θ, θ = (e_l + e₀)/(e_l − e_i), or its complement where the positive one is i
+    gi, gj = lone - ei, lone - ej
     if count == 1:
-        ti, tj = (lone + e0) / (lone - ei), (lone + e0) / (lone - ej)
-        w = high - c
+        wi, wj = gi / (alpha * gi + m * (lone + e0)), gj / (alpha * gj + m * (lone + e0))
     else:
-        ti, tj = (ei + e0) / (ei - lone), (ej + e0) / (ej - lone)
-        w = low - c
-    return l, i, j, c, p, lone - c * (frame[l] - p), w, 1.0 / (alpha + m * ti) - c, 1.0 / (alpha + m * tj) - c
+        wi, wj = gi / (alpha * gi - m * (ei + e0)), gj / (alpha * gj - m * (ej + e0))
+    return l, i, j, c, p, lone - c * (r[l] - p), w, wi - c, wj - c
 
 
 @njit(folder=_FOLDER)
