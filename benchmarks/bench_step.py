@@ -1,6 +1,9 @@
 """Steps of library laws at 1e5 points, one thread, with tangent, beside copying the same arrays: compare the ratios of one run.
 
 NUMBA_NUM_THREADS=1 python benchmarks/bench_step.py [LAW ...]
+
+A law written as NAME-stress is stepped in the stress formulation, from the stresses of the same strains: from the virgin state, and once
+more from states that other strains have left.
 """
 
 from __future__ import annotations
@@ -54,10 +57,52 @@ def seconds(run):
     return min(found)
 
 
+def half_plastic(update, base, state, direction, values):
+    """Strains base + t·direction, t such that about half of the steps from `state` are plastic."""
+    size, low, high = 1e-4, 1e-9, 1e3
+    few = None if state is None else {k: v[:2000] for k, v in state.items()}
+    for _ in range(40):
+        share = (update((base + size * direction)[:2000], few, **values).dissipation > 0).mean()
+        if abs(share - 0.5) < 0.02:
+            break
+        low, high = (size, high) if share < 0.5 else (low, size)
+        size = float(np.sqrt(low * high))
+    return base + size * direction
+
+
+def driven_by_stress(name, rng):
+    """Print two lines for a law in the stress formulation."""
+    from fenchel.integrators.thermal import thermal_input
+    from fenchel.integrators.update import packed_values
+
+    law, entry = LAWS[name], ENTRIES[name]
+    strain, update = law.compile(), law.compile(formulation="stress")
+    values = dict(entry.values) | dict(entry.worked.temperatures)
+    direction = rng.normal(size=(COUNT, 6))
+    before = strain(np.linalg.norm(entry.worked.eps) / 2 * rng.normal(size=(COUNT, 6)), None, **values)
+    for kind, base, state in (("virgin", np.zeros((COUNT, 6)), None), ("strained", before.strain, before.state)):
+        eps = half_plastic(strain, base, state, direction, values)
+        sig = strain(eps, state, **values).stress
+        heat, rest = thermal_input(law, values, COUNT)
+        rows = update.coefficients(packed_values(update, rest), 1.0, heat.temperature)
+        old = update.pack(state, COUNT)
+        new, found, compliance = np.empty_like(old), np.empty((COUNT, 6)), np.empty((COUNT, 36))
+        loss, status = np.empty(COUNT), np.empty(COUNT, dtype=np.int64)
+        step = seconds(lambda: update.pointers.run(sig, old, new, found, compliance, True, loss, status, rows))  # noqa: B023
+        copy = seconds(copied(eps, old))
+        print(
+            f"{name + '-stress':22s} {kind:16s} plastic {(loss > 0).mean():.2f}  {COUNT / step / 1e6:6.2f} M/s  "
+            f"step/copy {step / copy:6.2f}  copy {COUNT / copy / 1e6:.1f} M/s  strain off by {np.abs(found - eps).max():.1e}"
+        )
+
+
 def main() -> None:
     """Print one line per law."""
     rng = np.random.default_rng(0)
-    for name in sys.argv[1:] or LAWS:
+    for name in sys.argv[1:] or [*LAWS, "texsol-stress"]:
+        if name.endswith("-stress"):
+            driven_by_stress(name.removesuffix("-stress"), rng)
+            continue
         law, entry = LAWS[name], ENTRIES[name]
         update = law.compile()
         values = dict(entry.values) | dict(entry.worked.temperatures)

@@ -28,6 +28,7 @@ from numba import types
 
 from ..cache import content_hash, load_text, njit
 from .inverse_step import advance, begin, inverted
+from .isotropic_inverse import compliance_row, local_inverse, principal_solution
 from .kernel_types import LAW, METHOD, PLACES, ROW, STEP, TABLE, compiled
 from .key import kernels_hash
 from .spectral import eigen
@@ -71,75 +72,6 @@ def inverse_unilateral(plan: tuple[int, ...]) -> Any:
     """The compiled step of a plan."""
     text = _TEXT.format(plan=plan)
     return load_text("kernels", f"fenchel_inverse_step_{content_hash(text, kernels_hash())}", lambda: text).step
-
-
-@njit(folder=_FOLDER)
-def _isotropic(r0, r1, r2, alpha, beta, m, e0, mt, t0):
-    """Scalar equation in principal values: (mean part P, tr ε, which ε_i + e₀ are positive, β with the trace term, 1 + β Σ 1/α_i)."""
-    low, high = 1.0 / alpha, 1.0 / (alpha + m)
-    shift = m * e0
-    open_ = r0 + r1 + r2 > 0.0
-    P = beta * (r0 + r1 + r2) / (alpha + 3.0 * beta)
-    k0, k1, k2 = r0 - P > 0.0, r1 - P > 0.0, r2 - P > 0.0
-    T, b, D = 0.0, beta, 1.0
-    for _ in range(12):
-        b, base = (beta + mt, mt * t0) if open_ else (beta, 0.0)
-        w0, w1, w2 = high if k0 else low, high if k1 else low, high if k2 else low
-        x0 = r0 - base - (shift if k0 else 0.0)
-        x1 = r1 - base - (shift if k1 else 0.0)
-        x2 = r2 - base - (shift if k2 else 0.0)
-        D = max(1.0 + b * (w0 + w1 + w2), 1e-14)
-        T = (w0 * x0 + w1 * x1 + w2 * x2) / D
-        P = b * T + base
-        n0, n1, n2 = (r0 - P) * low + e0 > 0.0, (r1 - P) * low + e0 > 0.0, (r2 - P) * low + e0 > 0.0
-        next_ = T + t0 > 0.0
-        if n0 == k0 and n1 == k1 and n2 == k2 and next_ == open_:
-            break
-        k0, k1, k2, open_ = n0, n1, n2, next_
-    return P, T, k0, k1, k2, b, D
-
-
-@njit(folder=_FOLDER)
-def _linear(r, frame, alpha, m, e0, P, k0, k1, k2):
-    """The inverse of the map at its solution: ε = c (r − p I) + d n⊗n, and its derivative c 𝕀 + w n⊗n + w₁ d₁⊗d₁ + w₂ d₂⊗d₂ beside
-    the spherical part; n the axis whose sign stands alone, first of the places (l, i, j)."""
-    low, high = 1.0 / alpha, 1.0 / (alpha + m)
-    count = int(k0) + int(k1) + int(k2)
-    if count == 0:
-        return 0, 1, 2, low, P, 0.0, 0.0, 0.0, 0.0
-    shift = m * e0
-    if count == 3:
-        return 0, 1, 2, high, P + shift, 0.0, 0.0, 0.0, 0.0
-    if count == 1:
-        l = 0 if k0 else 1 if k1 else 2
-        c, p = low, P
-        lone = (frame[l] - P - shift) * high
-    else:
-        l = 2 if not k2 else 1 if not k1 else 0
-        c, p = high, P + shift
-        lone = (frame[l] - P) * low
-    i, j = (l + 1) % 3, (l + 2) % 3
-    ei, ej = c * (frame[i] - p), c * (frame[j] - p)
-    if count == 1:
-        ti, tj = (lone + e0) / (lone - ei), (lone + e0) / (lone - ej)
-        w = high - c
-    else:
-        ti, tj = (ei + e0) / (ei - lone), (ej + e0) / (ej - lone)
-        w = low - c
-    return l, i, j, c, p, lone - c * (frame[l] - p), w, 1.0 / (alpha + m * ti) - c, 1.0 / (alpha + m * tj) - c
-
-
-@njit(folder=_FOLDER)
-def _compliance(c, w, wi, wj, z_vv, z_vp, z_pp, dyads, t):
-    """c 𝕀 + w n⊗n + w_i d_i⊗d_i + w_j d_j⊗d_j − (v, p) Z (v, p)ᵀ into a row of 36; `dyads` holds n⊗n, d_i, d_j, v, p."""
-    for k in range(6):
-        n_k, i_k, j_k = w * dyads[0, k], wi * dyads[1, k], wj * dyads[2, k]
-        v_k, p_k = z_vv * dyads[3, k] + z_vp * dyads[4, k], z_vp * dyads[3, k] + z_pp * dyads[4, k]
-        for r in range(6):
-            t[6 * k + r] = (n_k * dyads[0, r] + i_k * dyads[1, r] + j_k * dyads[2, r]) - (
-                v_k * dyads[3, r] + p_k * dyads[4, r]
-            )
-        t[7 * k] += c
 
 
 @njit(folder=_FOLDER)
@@ -218,6 +150,7 @@ def _points(
         stage, tried, done, turn = 0, False, False, 0
         slip, gamma, d_slip, d_gamma = 0.0, 0.0, 0.0, 0.0
         fresh, frozen = True, False
+        k0, k1, k2, open_ = False, False, False, False
         n_01, n_02, n_12, v0, v1, v2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
         flag = 0
         c, w, wi, wj, beta, D, g_b, g_i, g_ii, q = 0.0, 0.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0
@@ -264,14 +197,33 @@ def _points(
                 fresh = False
                 v0, v1, v2 = frame[0], frame[1], frame[2]
             frame[0], frame[1], frame[2] = v0 + ball, v1 + ball, v2 + ball
-            P, T, k0, k1, k2, beta, D = _isotropic(frame[0], frame[1], frame[2], alpha, beta, me, e0, mt, t0)
-            l, i, j, c, p, d, w, wi, wj = _linear(full, frame, alpha, me, e0, P, k0, k1, k2)
+            low, high = 1.0 / alpha, 1.0 / (alpha + me)
+            if stage == 0:
+                open_ = v0 + v1 + v2 > 0.0
+                P = beta * (v0 + v1 + v2) / (alpha + 3.0 * beta)
+                k0, k1, k2 = v0 > P, v1 > P, v2 > P
+            P, T, k0, k1, k2, open_, beta, D = principal_solution(
+                frame[0], frame[1], frame[2], low, high, beta, me * e0, e0, mt, t0, k0, k1, k2, open_
+            )
+            l, i, j, c, p, d, w, wi, wj = local_inverse(frame, low, high, alpha, me, e0, P, k0, k1, k2)
             n0, n1, n2 = frame[3 + l], frame[6 + l], frame[9 + l]
             sphere, lone = p, d
             p -= ball
             e_0, e_1, e_2 = c * (z0 - p) + d * n0 * n0, c * (z1 - p) + d * n1 * n1, c * (z2 - p) + d * n2 * n2
             d *= _ROOT
             e_3, e_4, e_5 = c * z3 + d * n1 * n2, c * z4 + d * n0 * n2, c * z5 + d * n0 * n1
+            if me > 30.0 * s_0 and w != 0.0 and not frozen:
+                # c r would cancel against d n⊗n: from the principal values, e_j I + (e_l − e_j) n_l⊗n_l + (e_i − e_j) n_i⊗n_i
+                d = c * (frame[j] - sphere)
+                x0, x1, x2 = frame[3 + i], frame[6 + i], frame[9 + i]
+                s, u = c * (frame[l] - sphere) + lone - d, c * (frame[i] - sphere) - d
+                e_0, e_1, e_2 = (
+                    d + s * n0 * n0 + u * x0 * x0,
+                    d + s * n1 * n1 + u * x1 * x1,
+                    d + s * n2 * n2 + u * x2 * x2,
+                )
+                s, u = _ROOT * s, _ROOT * u
+                e_3, e_4, e_5 = s * n1 * n2 + u * x1 * x2, s * n0 * n2 + u * x0 * x2, s * n0 * n1 + u * x0 * x1
             if frozen and (wi != 0.0 or wj != 0.0):
                 # off-diagonal parts with the stiffness of their pair of axes
                 s, u = 2.0 * wi, 2.0 * wj
@@ -344,7 +296,7 @@ def _points(
             near = 2e-7 * h * gamma + noise
             if not frozen and h * abs(d_gamma) <= near and h * q * abs(d_slip) <= a * near:
                 # what is left is added by its first order, if it meets no kink on its way, or is rounding
-                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) / alpha
+                far = (abs(g_q * d_slip) * q + 2.0 * abs(g_t * d_gamma)) * low
                 gap = min(abs(T + t0), abs(c * (frame[l] - sphere) + lone + e0))
                 gap = min(gap, abs(c * (frame[i] - sphere) + e0), abs(c * (frame[j] - sphere) + e0))
                 if far <= 1e-6 * gap or (h * abs(d_gamma) <= noise and h * q * abs(d_slip) <= a * noise):
@@ -462,4 +414,4 @@ def _points(
         dyads[2, 0], dyads[2, 1], dyads[2, 2], dyads[2, 3], dyads[2, 4], dyads[2, 5] = j0, j1, j2, j3, j4, j5
         dyads[3, 0], dyads[3, 1], dyads[3, 2], dyads[3, 3], dyads[3, 4], dyads[3, 5] = v0, v1, v2, v3, v4, v5
         dyads[4, 0], dyads[4, 1], dyads[4, 2], dyads[4, 3], dyads[4, 4], dyads[4, 5] = p0, p1, p2, p3, p4, p5
-        _compliance(c, w, wi, wj, z_vv, z_vp, z_pp, dyads, t)
+        compliance_row(c, w, wi, wj, z_vv, z_vp, z_pp, dyads, t)
