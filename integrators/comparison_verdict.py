@@ -6,6 +6,8 @@ from dataclasses import dataclass
 
 __all__ = ["FormulationFigures", "Verdict", "judge"]
 
+SLOWER = 4.0
+
 
 @dataclass(frozen=True)
 class FormulationFigures:
@@ -26,7 +28,7 @@ class FormulationFigures:
     @property
     def text(self) -> str:
         """The figures in one line."""
-        count = f"{self.unknowns} unknown{'' if self.unknowns == 1 else 's'}"
+        count = _count(self.unknowns)
         condition = "" if self.condition is None else f", condition {self.condition:.3g}"
         if self.failure:
             return f"{self.formulation}: {count}{condition}, {self.failure}"
@@ -49,10 +51,18 @@ class Verdict:
     figures: tuple[FormulationFigures, ...]
 
     @property
+    def headline(self) -> str:
+        """The best formulation and the reason."""
+        return f"{self.best} suits best, {self.reason}" if self.best else self.reason
+
+    @property
     def text(self) -> str:
         """Verdict, reason and figures in one line."""
-        head = f"{self.best} suits best, {self.reason}" if self.best else self.reason
-        return f"{head} ({'; '.join(one.text for one in self.figures)})"
+        return f"{self.headline} ({'; '.join(one.text for one in self.figures)})"
+
+
+def _count(unknowns: int) -> str:
+    return f"{unknowns} unknown{'' if unknowns == 1 else 's'}"
 
 
 def judge(strain: FormulationFigures, stress: FormulationFigures) -> Verdict:
@@ -68,13 +78,13 @@ def judge(strain: FormulationFigures, stress: FormulationFigures) -> Verdict:
     ratio = (slow.time_per_step or 0.0) / max(fast.time_per_step or 0.0, 1e-12)
     if strain.unknowns != stress.unknowns:
         few, many = sorted(both, key=lambda one: one.unknowns)
-        if few is slow and ratio > 2.0:
+        if few is slow and ratio > SLOWER:
             return Verdict(
                 fast.formulation,
-                f"{ratio:.2g} times as fast in spite of {many.unknowns} unknowns against {few.unknowns}",
+                f"{ratio:.2g} times as fast in spite of {_count(many.unknowns)} against {few.unknowns}",
                 both,
             )
-        return Verdict(few.formulation, f"with {few.unknowns} unknowns per step against {many.unknowns}", both)
+        return Verdict(few.formulation, f"with {_count(few.unknowns)} per step against {many.unknowns}", both)
     conditions = (strain.condition, stress.condition)
     if None not in conditions:
         good, bad = sorted(both, key=lambda one: one.condition or 0.0)

@@ -1,8 +1,14 @@
 """What can be said of a path after it was followed, by code that did not follow it: duality gaps, and how well unknowns were determined.
 
-Gap of a row: that of the step from the state of the row before to the strain of this row by the general engine, increased by the distance
-of stress, forces and state to it, weighed with strain, increment and force (`certificate.duality_gap`). It is linear in an error, so that
-a wrong path cannot show a small one; which formulation made the path does not matter.
+Two bounds of the gap of a row, the step from the state of the row before to the strain of this row, which formulation ever made it; the
+smaller one counts:
+
+* that of the same step by the general engine, increased by the distance of stress, forces and state to it, weighed with strain, increment
+  and force (`certificate.duality_gap`);
+* what the optimality conditions of the declaration leave open, |ΔX − Δt ∂φ*(Y) − Σ λ_j ∂f_j(Y)|·|Y| + Σ λ_j |f_j(Y)|, λ ≥ 0 by least
+  squares, and |σ − ∂ψ/∂ε|·|ε|. It is not finite at a kink of f, and does not exist for laws that the explicit scheme does not take.
+
+Both are linear in an error, so that a wrong path cannot show a small one.
 """
 
 from __future__ import annotations
@@ -14,10 +20,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FenchelError
+from ..errors import DeclarationError, FenchelError
 from ..potentials import Law
 from .certificate import duality_gap
 from .declared import declared_step
+from .explicit import ExplicitUpdate, Integration
 from .general_step import GeneralStep
 from .history import History, Plan
 from .packing import StatePacking
@@ -27,6 +34,7 @@ __all__ = ["PathData", "gaps_or_none", "path_gaps", "path_tangents", "worst_cond
 
 Array = NDArray[np.float64]
 LOST = 1e15
+ACTIVE = 1e-6
 
 
 @dataclass(frozen=True)
@@ -46,7 +54,10 @@ class PathData:
         return {**self.values, heat.name: self.temperatures[rows]}
 
     def groups(self) -> list[tuple[NDArray[np.intp], float]]:
-        """(rows, time step) such that every row is in one group; steps that differ by rounding are equal."""
+        """(rows, time step), every row in one group; steps that differ by rounding are equal, and all where time does not matter."""
+        law = self.law
+        if law.phi is None and law.viscous == 0 and law.observable not in law.forces:
+            return [(np.arange(len(self.steps)), 1.0)]
         logs = np.round(np.log(self.steps), 11)
         return [(rows := np.flatnonzero(logs == value), float(self.steps[rows[0]])) for value in np.unique(logs)]
 
@@ -61,7 +72,49 @@ class PathData:
 
 
 def path_gaps(data: PathData, history: History) -> Array:
-    """Gap [J/m³] of every row, shape (n,); NaN where the engine itself finds no solution."""
+    """Gap [J/m³] of every row, shape (n,); NaN where neither bound is to be had."""
+    return np.fmin(_gaps_by_engine(data, history), _gaps_by_conditions(data, history))
+
+
+def _gaps_by_conditions(data: PathData, history: History) -> Array:
+    old, new = data.packed(history)
+    gaps = np.full(len(old), np.nan)
+    try:
+        update = ExplicitUpdate(data.law)
+    except DeclarationError:
+        return gaps
+    before = np.concatenate([np.zeros((1, 6)), history.eps[:-1]])
+    numbers = data.law.values(data.values)
+    for rows, dt in data.groups():
+        eps, everyone = history.eps[rows], np.arange(len(rows))
+        step = Integration(update, numbers, eps, np.hstack([old[rows], before[rows]]), dt)
+        with np.errstate(all="ignore"):
+            gaps[rows] = _left_open(step, eps, history.sig[rows], new[rows], everyone)
+    return gaps
+
+
+def _left_open(step: Integration, eps: Array, sig: Array, new: Array, everyone: NDArray[np.intp]) -> Array:
+    from scipy.optimize import nnls
+
+    y = step.forces(eps, new)
+    rest = new - step.old - step.creep_flow(y, everyone)
+    f, normals = step.surfaces(y, everyone), step.normals(y, everyone)
+    near = f >= -ACTIVE * (1.0 + np.abs(step.surfaces(np.zeros_like(y), everyone)))
+    left = np.abs((sig - step.stress(eps, new)) * eps).sum(axis=1)
+    for row in everyone:
+        active = np.flatnonzero(near[row])
+        gradient = normals[row, active]
+        if not (np.isfinite(gradient).all() and np.isfinite(rest[row]).all()):
+            left[row] = np.nan
+            continue
+        multipliers = nnls(gradient.T, rest[row])[0] if active.size and rest.shape[1] else np.zeros(len(active))
+        apart = rest[row] - multipliers @ gradient
+        left[row] += (np.abs(apart) * np.abs(y[row])).sum() + (multipliers * np.abs(f[row, active])).sum()
+        left[row] += (np.maximum(f[row], 0.0) * np.abs(rest[row]).max(initial=0.0)).sum()
+    return left
+
+
+def _gaps_by_engine(data: PathData, history: History) -> Array:
     old, new = data.packed(history)
     gaps = np.full(len(old), np.nan)
     for rows, dt in data.groups():

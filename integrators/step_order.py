@@ -68,10 +68,11 @@ def _cut(rows: Array, first: Any, parts: int) -> Array:
 
 
 def measure_order(
-    run: Callable[[StrainStressPath], History], path: StrainStressPath, parts: tuple[int, ...]
+    run: Callable[[StrainStressPath], History], path: StrainStressPath, parts: tuple[int, ...], strains: bool = True
 ) -> StepOrder:
-    """`run` follows a path; `parts` are powers of two from 1. A failure ends the study with what was found until then."""
-    found: list[tuple[Array, Array]] = []
+    """`run` follows a path; `parts` are powers of two from 1; `strains` false leaves the strains out, where the stresses do not determine
+    them. A failure ends the study with what was found until then."""
+    found: list[tuple[Array, ...]] = []
     failure = ""
     for count in parts:
         try:
@@ -79,7 +80,8 @@ def measure_order(
         except FenchelError as problem:
             failure = f"; in {count} parts: {' '.join(str(problem).split())}"
             break
-        found.append((history.sig[count - 1 :: count], history.eps[count - 1 :: count]))
+        both = (history.sig[count - 1 :: count], history.eps[count - 1 :: count])
+        found.append(both if strains else both[:1])
     done = parts[: len(found)]
     differences = []
     for one, two in pairwise(found):
