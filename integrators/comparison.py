@@ -6,9 +6,9 @@ counting as equal (then the first of the list). A gap is relative to the energy 
 
 Runs agree if the stress differs by no more than the tolerance, and strain and internal variables by the tolerance times the largest
 condition number that the unknowns of the formulation are solved with (not at all where it is infinite: the strain is not determined
-there), plus what the method itself promises: for cvxpy twice the error √(2 C g) that a gap g of 1e-8 W leaves, at which clarabel stops (W
-the energy stored and lost, C the stiffness; residuals of the same size add to it); for the explicit scheme ten times its tolerance and the error that the steps of implicit Euler
-have here.
+there), plus what the method itself promises: for cvxpy twice the error √(2 C g) that a gap g of 1e-8 W leaves, at which clarabel stops
+(W the energy stored and lost, C the stiffness; residuals of the same size add to it); for the explicit scheme ten times its tolerance and
+the error that the steps of implicit Euler have here.
 
 Which formulation suits: (1) one that cannot follow the path, or disagrees, loses; (2) of two that follow, the one with fewer unknowns
 per step wins (strain-driven: components of prescribed stress; stress-driven: of prescribed strain), unless its fastest solver takes

@@ -34,7 +34,7 @@ SAMPLED = ("cvxpy", "explicit")
 REPEATS = 5
 TIME_FOR_REPEATS = 0.5  # s
 TIME_FOR_SAMPLES = 10.0  # s
-SUB_STEPS = 2000
+SUB_STEPS = 500  # beyond that it is too slow to be compared, and the reason says so
 FORESEEN = (FenchelError, ArithmeticError, np.linalg.LinAlgError)
 
 
