@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..potentials import Law
+from .explicit import ExplicitUpdate
 from .general_update import GeneralUpdate
 from .history import History, drive_arrays
 from .path_file import StrainStressPath, read_path
@@ -20,7 +21,7 @@ __all__ = ["drive"]
 
 
 def drive(
-    law: Law | Update | GeneralUpdate | StressUpdate,
+    law: Law | Update | GeneralUpdate | StressUpdate | ExplicitUpdate,
     path: StrainStressPath | str | Path,
     values: Mapping[str, Any],
     initial_state: Mapping[str, Any] | None = None,
@@ -34,7 +35,7 @@ def drive(
     Raises `InputError` for bad input, `ConvergenceError` with the row where the path cannot be followed.
     """
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
-    compiled = isinstance(law, (Update, GeneralUpdate, StressUpdate))
+    compiled = isinstance(law, (Update, GeneralUpdate, StressUpdate, ExplicitUpdate))
     update = law if compiled else build_update(law, solver=solver, formulation=formulation)
     return drive_arrays(
         update,

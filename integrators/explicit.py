@@ -27,7 +27,7 @@ from ..potentials.scalars import ScalarVariable
 from .declared import components
 from .update import StepResult, strain_array
 
-__all__ = ["ExplicitUpdate"]
+__all__ = ["ExplicitUpdate", "Integration"]
 
 Array = NDArray[np.float64]
 SMALLEST = 1e-9
@@ -87,7 +87,7 @@ class ExplicitUpdate:
         if not (np.isfinite(dt) and dt > 0):
             raise InputError(f"dt = {dt}: the time step must be positive and finite")
         goal = strain_array(eps_new)
-        return _Integration(
+        return Integration(
             self, self.law.admissible_values(values), goal, self._packed(state, len(goal)), float(dt)
         ).run()
 
@@ -106,7 +106,7 @@ class ExplicitUpdate:
         return np.concatenate(parts, axis=1)
 
 
-class _Integration:
+class Integration:
     """One call: all points side by side, each with its own sub-step."""
 
     def __init__(self, update: ExplicitUpdate, values: dict[str, float], goal: Array, packed: Array, dt: float) -> None:
@@ -177,6 +177,14 @@ class _Integration:
         found = [self._pack(slope, env, len(y)) for slope in self.slopes]
         return np.stack(found, axis=1) if found else np.zeros((len(y), 0, self.size))
 
+    def creep_flow(self, y: Array, rows: NDArray[np.intp]) -> Array:
+        """Increment dt ∂φ*(Y) of the finite part of φ*, (n, size)."""
+        return self.dt * self._pack(self.creep, self._environment(y, rows), len(y)) if self.creep else np.zeros_like(y)
+
+    def stress(self, strain: Array, x: Array) -> Array:
+        """∂ψ/∂ε [Pa], (n, 6)."""
+        return np.broadcast_to(evaluate(self.law.stress, self._state(strain, x)), (len(x), 6)).copy()
+
     def _along(self, strain: Array, x: Array, d_strain: Array, d_x: Array) -> Array:
         """Directional derivative of the forces, by a central difference (exact for a quadratic ψ)."""
         scale = np.maximum(np.abs(d_strain).max(axis=1), np.abs(d_x).max(axis=1, initial=0.0))
@@ -188,7 +196,7 @@ class _Integration:
     def rate(self, strain: Array, x: Array, d_strain: Array, rows: NDArray[np.intp], active: Any) -> tuple[Array, Any]:
         """Ẋ for strain rate `d_strain` per unit of the step, and which surfaces flow."""
         y = self.forces(strain, x)
-        flow = self.dt * self._pack(self.creep, self._environment(y, rows), len(x)) if self.creep else np.zeros_like(x)
+        flow = self.creep_flow(y, rows)
         if not active.any():
             return flow, active
         normals = np.where(active[:, :, None], self.normals(y, rows), 0.0)
@@ -253,8 +261,7 @@ class _Integration:
                 f"the explicit step fails at {int((status != 0).sum())} of {count} points, first {row}, strain {self.goal[row]}: "
                 "its sub-steps became too short (a vertex, or a tolerance out of reach); use solver='auto'"
             )
-        env = self._state(self.goal, x)
-        stress = np.broadcast_to(evaluate(self.law.stress, env), (count, 6)).copy()
+        stress = self.stress(self.goal, x)
         packed = np.concatenate([x, self.goal], axis=1)
         new = {n: (packed[:, s] if k == 1 else packed[:, s : s + k]) for n, (s, k) in self.update.layout.items()}
         return StepResult(stress, None, new, lost, status, None)

@@ -100,17 +100,22 @@ def follow(
     """
     n = len(base)
     found = {"eps": np.zeros((n, 6)), "sig": np.zeros((n, 6)), "state": np.zeros((n, update.state_size))}
-    found |= {"psi": np.zeros(n), "dissipation": np.zeros(n)}
+    found |= {"psi": np.zeros(n), "dissipation": np.zeros(n), "iterations": np.zeros(n)}
     steps = _Steps(update, values, times, temperatures)
     turned = update.formulation == "stress"
     last, old, highest, total, warm = start, packed, 0.0, 0.0, None
+    whole = -1.0
     for row in range(n):
         along = z.T @ (last - base[row]) / np.maximum((z * z).sum(axis=0), 1e-300)
         trial = base[row] + z @ along
         out = steps.at(row, trial, old, warm)
+        if whole < 0.0:
+            # the size that the path has in all, so that a row of zeros is not asked for digits that rounding does not leave
+            whole = max(float(np.abs(goal).max(initial=0.0)), float(np.abs(out.tangent).max() * np.abs(base).max()))
         for turn in range(TURNS):
             gap = v @ out.answer - goal[row]
-            level = max(float(np.abs(out.answer).max()), float(np.abs(goal[row]).max(initial=0.0)), 1e-3 * highest)
+            level = max(float(np.abs(out.answer).max()), float(np.abs(goal[row]).max(initial=0.0)))
+            level = max(level, 1e-3 * highest, 1e-3 * whole)
             size = float(np.abs(gap).max(initial=0.0))
             if out.status != 0:
                 return row, size, level, found
@@ -138,4 +143,5 @@ def follow(
         found["state"][row] = old[0]
         found["psi"][row] = update.energy(found["eps"][row], update.packing.unpack(old), **steps.given(row))[0]
         found["dissipation"][row] = total
+        found["iterations"][row] = turn
     return -1, 0.0, highest, found

@@ -17,15 +17,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .explicit import ExplicitUpdate
 from .general_path import follow
 from .general_update import GeneralUpdate
 from .path_loop import path_loop
+from .prescribed_path import follow_prescribed, has_tangent
 from .stress_path import stress_plan
 from .stress_update import StressUpdate
 from .thermal import thermal_input, thermal_results
 from .update import Array, Update, packed_values
 
-__all__ = ["History", "drive_arrays"]
+__all__ = ["History", "Plan", "drive_arrays", "path_plan", "time_steps"]
 
 TOLERANCE = 1e-12
 TURNS = 60
@@ -36,7 +38,8 @@ class History:
     """Path of one material point, one row per step.
 
     `eps` [-] and `sig` [Pa] (n, 6), Mandel; `state` by name; `psi` [J/m³] (n,); `dissipation` accumulated [J/m³] (n,); `status` (n,); of a
-    law with a temperature also `temperature` [K] (n,) and `entropy` [J/(m³ K)] (n,).
+    law with a temperature also `temperature` [K] (n,) and `entropy` [J/(m³ K)] (n,); `iterations` (n,) the linear systems solved for the
+    unknown components of a step, None where none can be solved.
     """
 
     eps: Array
@@ -47,10 +50,11 @@ class History:
     status: NDArray[np.int64]
     temperature: Array | None = None
     entropy: Array | None = None
+    iterations: Array | None = None
 
 
 def drive_arrays(
-    update: Update | GeneralUpdate | StressUpdate,
+    update: Update | GeneralUpdate | StressUpdate | ExplicitUpdate,
     control: Any,
     targets: Any,
     values: Mapping[str, Any],
@@ -68,11 +72,51 @@ def drive_arrays(
     `control` (6,): True where the stress [Pa] is prescribed, False where the strain [-] is; `targets` (n, 6) the prescribed values,
     Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
     condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the scale of the stress (of the
-    strain for an update driven by the stress);
+    strain for an update driven by the stress). An update without tangent (cvxpy, explicit) follows a path that leaves no component unknown.
     `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference) and are named in
     messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
+    turned = _turned(update)
+    plan = path_plan(control, targets, trace, trace_targets, turned)
+    try:
+        start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
+    except (TypeError, ValueError):
+        start = np.full(6, np.nan)
+    if not np.isfinite(start).all():
+        raise InputError("drive: initial_strain must be six finite Mandel components")
+    if turned:
+        start = np.zeros(6)  # only where the search begins: the stress there is not known
+    if not has_tangent(update):
+        return follow_prescribed(update, plan, values, initial_state, time_steps(times, len(plan.base)), temperatures)
+    if isinstance(update, GeneralUpdate) or (isinstance(update, StressUpdate) and not update.compiled_path):
+        return _run_general(update, plan, values, start, initial_state, times, temperatures)
+    given = dict(values)
+    if temperatures is not None:
+        if update.law.temperature is None:
+            raise InputError(f"law '{update.law.name}' has no temperature; leave the temperatures out")
+        given[update.law.temperature.name] = temperatures
+    return _run(update, plan, given, start, initial_state, tolerance, times)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """V a(base + Z y) = goal, a the answer of the update: base (n, 6), goal (n, k), Z (6, k), V (k, 6); `symmetric` if it is a gradient."""
+
+    base: Array
+    goal: Array
+    z: Array
+    v: Array
+    symmetric: bool
+
+    @property
+    def unknowns(self) -> int:
+        """Number k of unknowns of a step."""
+        return self.z.shape[1]
+
+
+def path_plan(control: Any, targets: Any, trace: str | None, trace_targets: Any, turned: bool) -> Plan:
+    """What `drive_arrays` solves for, from its arguments; `turned` if the stress drives the update. `InputError` for what is ill-formed."""
     mask = np.asarray(control, dtype=bool)
     goals = np.array(targets, dtype=float, ndmin=2)
     if mask.shape != (6,) or goals.ndim != 2 or goals.shape[1] != 6:
@@ -98,40 +142,12 @@ def drive_arrays(
         raise InputError(
             f"drive: targets hold a value that is not finite (row {int(np.argmax(~np.isfinite(goals).all(axis=1)))})"
         )
-    turned = _turned(update)
-    plan = (
-        (_Plan(*stress_plan(mask, free, goals, trace, condition)))
-        if turned
-        else _plan(mask, free, goals, trace, condition)
-    )
-    try:
-        start = np.zeros(6) if initial_strain is None else np.array(initial_strain, dtype=float).reshape(6)
-    except (TypeError, ValueError):
-        start = np.full(6, np.nan)
-    if not np.isfinite(start).all():
-        raise InputError("drive: initial_strain must be six finite Mandel components")
     if turned:
-        start = np.zeros(6)  # only where the search begins: the stress there is not known
-    if isinstance(update, GeneralUpdate) or (isinstance(update, StressUpdate) and not update.compiled_path):
-        return _run_general(update, plan, values, start, initial_state, times, temperatures)
-    given = dict(values)
-    if temperatures is not None:
-        if update.law.temperature is None:
-            raise InputError(f"law '{update.law.name}' has no temperature; leave the temperatures out")
-        given[update.law.temperature.name] = temperatures
-    return _run(update, plan, given, start, initial_state, tolerance, times)
+        return Plan(*stress_plan(mask, free, goals, trace, condition))
+    return _plan(mask, free, goals, trace, condition)
 
 
-@dataclass(frozen=True)
-class _Plan:
-    base: Array
-    goal: Array
-    z: Array
-    v: Array
-    symmetric: bool
-
-
-def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace: str | None, condition: Array) -> _Plan:
+def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace: str | None, condition: Array) -> Plan:
     strain = ~mask & ~free
     base = np.where(strain, goals, 0.0)
     stressed = np.flatnonzero(mask & ~free)
@@ -161,12 +177,12 @@ def _plan(mask: NDArray[np.bool_], free: NDArray[np.bool_], goals: Array, trace:
     v = np.array(rows).reshape(count, 6)
     goal_rows = np.array(goal).T.reshape(len(goals), count)
     arrays = [np.ascontiguousarray(a) for a in (base, goal_rows, z, v)]
-    return _Plan(arrays[0], arrays[1], arrays[2], arrays[3], symmetric)
+    return Plan(arrays[0], arrays[1], arrays[2], arrays[3], symmetric)
 
 
 def _run(
     update: Update | StressUpdate,
-    plan: _Plan,
+    plan: Plan,
     given: Mapping[str, Any],
     start: Array,
     initial_state: Mapping[str, Any] | None,
@@ -179,11 +195,11 @@ def _run(
     pointers: Any = update.pointers
     turned = _turned(update)
     # a law that is not viscous has one row of coefficients for all steps
-    steps = _time_steps(times, n) if update.module.VISCOUS and times is not None else 1.0
+    steps = time_steps(times, n) if update.module.VISCOUS and times is not None else 1.0
     found = update if isinstance(update, StressUpdate) else pointers
     coefficients = found.coefficients(parameters, steps, heat.temperature)
     eps, sig, state = np.zeros((n, 6)), np.zeros((n, 6)), np.zeros((n, update.state_size))
-    dissipation = np.zeros(n)
+    dissipation, turns = np.zeros(n), np.zeros(n)
     old = update.pack(initial_state, 1)[0]
     failed, residual, scale = path_loop()(
         pointers.step,
@@ -203,6 +219,7 @@ def _run(
         eps if turned else sig,
         state,
         dissipation,
+        turns,
         tolerance,
         TURNS,
     )
@@ -211,12 +228,12 @@ def _run(
     named = update.unpack(state)
     entropy, _ = thermal_results(update.law, heat, eps, named, values)
     temperature = None if update.law.temperature is None else np.broadcast_to(heat.temperature, (n,)).copy()
-    return History(eps, sig, named, psi, dissipation, np.zeros(n, dtype=np.int64), temperature, entropy)
+    return History(eps, sig, named, psi, dissipation, np.zeros(n, dtype=np.int64), temperature, entropy, turns)
 
 
 def _run_general(
     update: GeneralUpdate | StressUpdate,
-    plan: _Plan,
+    plan: Plan,
     values: Mapping[str, Any],
     start: Array,
     initial_state: Mapping[str, Any] | None,
@@ -229,13 +246,12 @@ def _run_general(
     if temperatures is not None:
         temperatures = np.broadcast_to(np.asarray(temperatures, dtype=float), (n,))
     failed, residual, scale, found = follow(
-        update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, _time_steps(times, n), temperatures
+        update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, time_steps(times, n), temperatures
     )
     _raise_failure(update, failed, residual, scale, times)
     unpacked = update.packing.unpack(found["state"])
-    return History(
-        found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], np.zeros(n, dtype=np.int64)
-    )
+    status, turns = np.zeros(n, dtype=np.int64), found["iterations"]
+    return History(found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], status, iterations=turns)
 
 
 def _turned(update: Any) -> bool:
@@ -243,7 +259,7 @@ def _turned(update: Any) -> bool:
     return isinstance(update, StressUpdate) or (isinstance(update, GeneralUpdate) and update.turned)
 
 
-def _time_steps(times: Any, count: int) -> Array:
+def time_steps(times: Any, count: int) -> Array:
     """Differences of the times; the first row, the start of the path, and rows without times count as one unit."""
     if times is None:
         return np.ones(count)

@@ -20,7 +20,7 @@ __all__ = ["path_loop"]
 
 _SIGNATURE = types.Tuple((types.int64, types.float64, types.float64))(
     STEP, METHOD, LAW, LAW, PLACES, TABLE, TABLE, TABLE, TABLE, TABLE, types.boolean, ROW, ROW, TABLE, TABLE, TABLE, ROW,
-    types.float64, types.int64,
+    ROW, types.float64, types.int64,
 )  # fmt: skip
 
 
@@ -73,12 +73,13 @@ def _drive(
     out_sig,
     out_state,
     out_loss,
+    out_turns,
     tolerance,
     limit,
 ):
     """Steps under mixed control: find y with v sigma(base + z y) = goal, by damped Newton; returns (failed row, residual, scale).
 
-    The strain increment lies in the span of the columns of `z`, the stress is tested by the rows of `v`.
+    The strain increment lies in the span of the columns of `z`, the stress is tested by the rows of `v`; `out_turns` counts linear systems.
     """
     steps, size = base.shape[0], z.shape[1]
     # the step works on arrays of points: here of one
@@ -189,4 +190,5 @@ def _drive(
             old[i] = new[i]
             out_state[n, i] = new[i]
         out_loss[n] = total
+        out_turns[n] = turns - 1
     return -1, 0.0, highest

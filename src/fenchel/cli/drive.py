@@ -13,9 +13,10 @@ from .signs import SIGNS, Signs, turn_columns, turn_path
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
-    from fenchel.integrators import History, StressUpdate, Update
+    from fenchel.integrators import History
+    from fenchel.potentials import Law
 
-__all__ = ["register"]
+__all__ = ["register", "write_text"]
 
 
 class Solver(StrEnum):
@@ -27,6 +28,8 @@ class Solver(StrEnum):
     principal = "principal"
     general = "general"
     conic = "conic"
+    cvxpy = "cvxpy"
+    explicit = "explicit"
 
 
 def register(app: typer.Typer) -> None:
@@ -55,7 +58,7 @@ def _drive(
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
     """
     from fenchel.errors import InputError
-    from fenchel.integrators import StressUpdate, Update, drive, read_path
+    from fenchel.integrators import drive, read_path
     from fenchel.integrators.path_file import history_columns
     from fenchel.potentials import load_law
 
@@ -65,17 +68,17 @@ def _drive(
     plan = turn_path(read_path(path), signs)
     declared = load_law(law)
     update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
-    if certify and not isinstance(update, (Update, StressUpdate)):
+    if certify and solver is Solver.explicit:
         raise InputError(
-            "--certify needs a generated step; the general method is its own certificate: leave --certify out"
+            "--certify: an explicit step is not the minimum of a program and has no gap: leave --certify out"
         )
     history = drive(update, plan, values)
     columns: dict[str, Any] = dict(history_columns(history, plan.time))
     if certify:
-        columns["gap"] = _gaps(update, history, values, plan.time)
+        columns["gap"] = _gaps(declared, history, values, plan.time, plan.temperature)
     columns = turn_columns(columns, signs)
     if output is not None:
-        _write(output, csv_text(columns))
+        write_text(output, csv_text(columns))
     if json_wanted:
         print_json(columns)
     elif output is not None:
@@ -95,7 +98,7 @@ def _worth_showing(name: str, column: Any, columns: dict[str, Any]) -> bool:
     return bool(abs(column).max() > 1e-9 * largest)
 
 
-def _write(output: Path, text: str) -> None:
+def write_text(output: Path, text: str) -> None:
     """Write in one piece, so that a full disk leaves an older file as it was; a pipe or a device is written to directly."""
     if output.exists() and not output.is_file():
         output.write_text(text, encoding="utf-8")
@@ -105,24 +108,9 @@ def _write(output: Path, text: str) -> None:
     replace_file(output.resolve(), text.encode())
 
 
-def _gaps(update: Update | StressUpdate, history: History, values: dict[str, float], times: Any) -> Any:
-    """Duality gap of every step: each row once more, from the state of the row before."""
-    import numpy as np
+def _gaps(law: Law, history: History, values: dict[str, float], times: Any, temperatures: Any) -> Any:
+    """Duality gap of every step: each row once more by the general engine, from the state of the row before."""
+    from fenchel.integrators.history import time_steps
+    from fenchel.integrators.path_certificate import PathData, path_gaps
 
-    from fenchel.integrators import StressUpdate
-
-    driven = history.sig if isinstance(update, StressUpdate) else history.eps
-    before = {name: np.concatenate([np.zeros_like(state[:1]), state[:-1]]) for name, state in history.state.items()}
-    given: dict[str, Any] = dict(values)
-    if history.temperature is not None and update.law.temperature is not None:
-        given[update.law.temperature.name] = history.temperature
-    if not update.module.VISCOUS or len(times) < 2:
-        return update(driven, before, certify=True, **given).gap
-    found = []
-    for row, dt in enumerate(np.diff(times, prepend=2.0 * times[0] - times[1])):
-        state = {name: value[row : row + 1] for name, value in before.items()}
-        own = {k: v[row] if np.ndim(v) else v for k, v in given.items()}
-        gap = update(driven[row], state, float(dt), certify=True, **own).gap
-        assert gap is not None  # certify=True asks for it
-        found.append(gap[0])
-    return np.array(found)
+    return path_gaps(PathData(law, values, time_steps(times, len(times)), temperatures), history)
