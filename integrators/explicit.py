@@ -244,11 +244,13 @@ class Integration:
             strain = self.start[open_] + done[open_, None] * whole[open_]
             moved, d_lost, error, size, wrong = self._substep(strain, x[open_], whole[open_], step, open_)
             reached = np.maximum(scale[open_], size)
-            relative = error / np.maximum(reached, np.finfo(float).tiny)
+            with np.errstate(over="ignore"):
+                relative = error / np.maximum(reached, np.finfo(float).tiny)
             good = (relative <= self.update.tolerance) & ~wrong
             rows = open_[good]
-            # what a rejected sub-step overshoots to is no stress that was met
-            scale[rows] = reached[good]
+            # a stress that is known to a tenth is one that is met; what a far too long sub-step overshoots to is not
+            sound = relative <= 0.1
+            scale[open_[sound]] = reached[sound]
             x[rows], lost[rows] = moved[good], lost[rows] + d_lost[good]
             done[rows] += step[good]
             done[rows] = np.where(done[rows] > 1.0 - 1e-14, 1.0, done[rows])

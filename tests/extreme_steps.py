@@ -236,7 +236,10 @@ def evaluate(cell: Cell) -> Row:
         return Row(cell.law, cell.setting, 1.0, message=str(refusal))
 
 
-def rows() -> list[Row]:
-    """The table, with numpy's own warnings silenced: what is not finite is found by looking."""
+def rows(*, million: bool | None = None) -> list[Row]:
+    """The table; only the paths of a million steps if `million`, all but them if it is False.
+
+    numpy's own warnings are silenced: what is not finite is found by looking.
+    """
     with np.errstate(all="ignore"):
-        return [evaluate(cell) for cell in cells()]
+        return [evaluate(c) for c in cells() if million is None or (c.check is million_steps) == million]

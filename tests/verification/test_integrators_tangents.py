@@ -5,10 +5,13 @@ at two widths and extrapolated; where the two disagree, or the two sides, there 
 symmetric and between zero and the stiffness everywhere is asked for in `test_integrators_accuracy`.
 """
 
+from types import SimpleNamespace
+
 import awkward_states
 import numpy as np
 import pytest
 from awkward_states import NAMES, kinds
+from law_truth import TRUTHS, Numpy, lame, mandel, stiffness
 from step_optimality import Step
 
 from fenchel.potentials.library import ENTRIES
@@ -54,3 +57,24 @@ def test_tangent_equals_differences_in_every_region(name, monkeypatch):
     share = np.array([smooth[kinds(count) == k].mean() for k in range(len(NAMES))])
     assert smooth.mean() >= 0.6, share
     assert (share[[0, 5, 6, 7]] >= 0.4).all(), share
+
+
+@pytest.mark.parametrize("name", ["tresca", "mohr_coulomb", "rankine"])
+def test_tangent_beside_a_coincidence_that_is_not_reached(name):
+    """Two principal stresses near each other, f just passed: the answer stays on a face, and turns with its trial as the face says."""
+    values = dict(ENTRIES[name].values)
+    v, update = SimpleNamespace(**values), ENTRIES[name].law.compile()
+    s = np.array([1.0, 1.0 - 1e-4, -1.0])
+    zero = {"eps_p": np.zeros(6), "p": np.float64(0.0)}
+    stress = mandel(np.diag(s))
+    # scaled until f = 0, then a millionth more; f is of degree one but for its limit
+    (limit,) = (-f for f in TRUTHS[name].surfaces(Numpy(), v, zero, zero))
+    (unit,) = TRUTHS[name].surfaces(Numpy(), v, zero | {"eps_p": stress}, zero)
+    stress = stress * limit / (unit + limit) * (1 + 1e-6)
+    eps = np.linalg.solve(stiffness(*lame(v.E, v.nu)), stress)
+    width = 2e-8 * np.abs(eps).max()
+    out = update(eps, None, **values)
+    assert out.dissipation[0] > 0
+    ends = update(eps + width * np.concatenate([np.eye(6), -np.eye(6)]), None, **values).stress
+    numeric = (ends[:6] - ends[6:]).T / (2 * width)
+    assert np.abs(out.tangent[0] - numeric).max() <= 1e-3 * v.E
