@@ -17,7 +17,16 @@ from .general import ITERATION_LIMIT, ROUNDING, solve_points
 from .scalar_terms import POWER_TERM
 from .step_program import StepProgram
 
-__all__ = ["INFEASIBLE", "BatchSolution", "interior_start", "run_engine", "run_interior", "slopes_of", "solve_batch"]
+__all__ = [
+    "INFEASIBLE",
+    "BatchSolution",
+    "interior_start",
+    "run_engine",
+    "run_interior",
+    "slopes_of",
+    "solve_batch",
+    "solve_whole",
+]
 
 Array = NDArray[np.float64]
 INFEASIBLE = 9
@@ -153,6 +162,17 @@ def interior_start(program: StepProgram, data: Array) -> tuple[tuple[Array, Arra
     """clarabel's answers as a start of the compact form, and where it says infeasible."""
     y, multipliers, infeasible = run_interior(program, data)
     return program.compact.start(y, multipliers), infeasible
+
+
+def solve_whole(program: StepProgram, data: Array) -> BatchSolution:
+    """The engine on `program` itself, nothing left out; points where it stops short once more from clarabel's answer."""
+    found = run_engine(program, data, tangent=False)
+    left = np.flatnonzero(found.status > ROUNDING)
+    if left.size:
+        y, multipliers, _ = run_interior(program, data[left])
+        again = run_engine(program, data[left], tangent=False, start=(y, multipliers), tau=1e3)
+        found.take(left, again)
+    return found
 
 
 def slopes_of(program: StepProgram, data: Array, y: Array, multipliers: Array) -> Array:

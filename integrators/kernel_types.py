@@ -30,6 +30,7 @@ __all__ = [
     "STEP_SIGNATURE",
     "STEP_SIGNATURE_32",
     "TABLE",
+    "TRIAL_SIGNATURE",
     "compiled",
     "no_law",
     "no_method",
@@ -47,6 +48,7 @@ STEP_SIGNATURE = types.void(
     METHOD, LAW, LAW, TABLE, TABLE, TABLE, TABLE, TABLE, types.int64, ROW, PLACES, TABLE, PLACES
 )
 STEP = types.FunctionType(STEP_SIGNATURE)
+TRIAL_SIGNATURE = types.void(TABLE, TABLE, TABLE, TABLE, TABLE, TABLE)
 ROW_32 = types.Array(types.float32, 1, "C")
 TABLE_32 = types.Array(types.float32, 2, "C")
 STEP_SIGNATURE_32 = types.void(

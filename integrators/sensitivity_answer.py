@@ -1,6 +1,6 @@
 """What the compiled reduced step found, before it becomes tensors: trial values, increments, forces, P, and the law's functions there.
 
-The trial values and the method are those of `reduced_step` itself, called through the same pointers: derivatives that are built on its
+The trial values and the method are those of the reduced step itself, called through the same pointers: derivatives that are built on its
 answer speak of the same active set. Of the closed form the region is found by its own inequalities, in its own order of operations.
 """
 
@@ -14,25 +14,22 @@ from numba import types
 from numpy.typing import NDArray
 
 from .kernel_types import LAW, METHOD, PLACES, TABLE, compiled, no_law, no_method
+from .kernels import trial_kernel
 from .plan import FROZEN, MOVING, SURFACES, UNKNOWNS
 from .pointers import StepPointers
-from .reduced_step import _trial
 from .spectral import add_positive_derivative, positive_part
 
 __all__ = ["ReducedAnswer", "closed_faces", "function_values", "positive_parts", "reduced_answer"]
 
 Array = NDArray[np.float64]
 
-_ANSWERS = types.void(METHOD, LAW, TABLE, TABLE, TABLE, TABLE, TABLE, TABLE, PLACES, TABLE, PLACES)
+_ANSWERS = types.void(METHOD, LAW, TABLE, TABLE, PLACES, TABLE, PLACES)
 _VALUES = types.void(LAW, TABLE, TABLE, TABLE, TABLE, TABLE)
 _POSITIVE = types.void(TABLE, TABLE, TABLE)
 
 
-def _answers(method, law, eps, old, trial, b, axes, found, status, coefficients, plan):
-    step = 1 if coefficients.shape[0] > 1 else 0
-    for m in range(eps.shape[0]):
-        _trial(eps[m], old[m], coefficients[step * m], plan, b[m], axes[m], trial[m])
-    method(law, trial, coefficients, 0, plan, found, status, eps.shape[0])
+def _answers(method, law, trial, found, status, coefficients, plan):
+    method(law, trial, coefficients, 0, plan, found, status, trial.shape[0])
 
 
 def _values(law, z, s, gamma, coefficients, out):
@@ -74,7 +71,8 @@ def reduced_answer(
     trial, b, axes = np.zeros((count, n + data + 1)), np.zeros((count, 6)), np.zeros((count, 12))
     found, status = np.zeros((count, 2 * n + n * n + 1)), np.zeros(count, dtype=np.int64)
     method, law = (no_method(), no_law()) if pointers is None else (pointers.method, pointers.law)
-    compiled(_answers, _ANSWERS)(method, law, eps, old, trial, b, axes, found, status, coefficients, plan)
+    trial_kernel(6, tuple(int(i) for i in plan))(eps, old, coefficients, trial, b, axes)
+    compiled(_answers, _ANSWERS)(method, law, trial, found, status, coefficients, plan)
     slope = found[:, 2 * n : 2 * n + n * n].reshape(count, n, n)
     return ReducedAnswer(trial[:, :n], trial[:, n : n + data], b, axes, found[:, :n], found[:, n : 2 * n], slope)
 

@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DeclarationError
+from .batch import ROUNDING, solve_whole
 from .cone_projection import ORTHANT, SEMIDEFINITE, project
-from .general_step import GeneralStep
+from .general_step import GeneralStep, Part
 from .program_slopes import SPACING, ProgramSlopes, central_difference
 from .sensitivity_strain import add_declared_energy
 from .step_program import Stacked
@@ -81,18 +82,23 @@ class _Group:
         for k in range(len(distinct)):
             points = np.flatnonzero(self.place == k)
             heated = None if temperature is None else temperature[points]
-            alone = GeneralStep(self.law, self.step.parameters, dt, self.step.declared, self.step._programs, False)
+            alone = GeneralStep(
+                self.law, self.step.parameters, dt, self.step.declared, _programs=self.step._programs, _affine=False
+            )
             found = alone.solve(eps[points], old[points], heated, tangent=False)
             self.status[points] = found.status
             self.solved[k] = points, found
 
     def derivatives(self, d_old: Array, d_eps: Array) -> tuple[Array, Array, Array]:
+        from .update import raise_failures
+
         count, width = len(self.eps), d_eps.shape[2]
         d_rows = self._row_slopes(d_old)
         wide = self.old.shape[1]
         d_stress, d_new, d_lost = np.zeros((count, 6, width)), np.zeros((count, wide, width)), np.zeros((count, width))
         for k, (points, found) in self.solved.items():
-            program = found.parts[0].program.compact.program
+            part = found.parts[0]
+            program = part.program
             if any(c.kind > SEMIDEFINITE for c in program.cones):
                 raise DeclarationError(
                     f"law '{self.law.name}': no sensitivities by the general method for powers, exponentials and logarithms"
@@ -108,7 +114,10 @@ class _Group:
             changes = [(slopes.by(what), weight) for what, weight in weights]
             d_data = np.concatenate([d_eps[points], d_old[points]], axis=1)
             base = slopes.base
-            one = _Solution(program, base, found.parts[0]).answered(changes, d_data)
+            # the program as it is assembled: what the compact form leaves out has a derivative too
+            whole = solve_whole(program, part.data)
+            raise_failures(np.where(whole.status > ROUNDING, 1, 0), self.eps[points])
+            one = _Solution(program, base, Part(part.points, program, part.data, whole)).answered(changes, d_data)
             d_slope, d_step = one
             size = d_step.shape[1]
             d_stress[points] = d_slope[:, :6]

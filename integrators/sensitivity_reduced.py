@@ -1,7 +1,7 @@
 """Derivatives of the reduced and closed steps: trial values, the projection, then tensors again, each differentiated where it stands.
 
 Kind 0, n = dev B/q, slip = e_q/q:   d(slip dev B) = slip d(dev B) + n (de_q − slip dq), the second term absent where q is rounding;
-kind 1, dB in the frame of B:        (dF)_ii = de_i,  (dF)_ij = (e_i − e_j)/(b_i − b_j) (dB)_ij, the limit of `reduced_step` where equal.
+kind 1, dB in the frame of B:        (dF)_ii = de_i,  (dF)_ij = (e_i − e_j)/(b_i − b_j) (dB)_ij, the limit of the step where equal.
 """
 
 from __future__ import annotations
@@ -230,7 +230,7 @@ class _Step:
         d_head = None
         if self.norm:
             q, e_q = answer.trial[:, 0], answer.e[:, 0]
-            # the same test as in `reduced_step`: where the deviator is rounding of the strain, the limit P_qq
+            # the same test as in the reduced step: where the deviator is rounding of the strain, the limit P_qq
             size = 1e-13 * np.abs(s.c[:, 3]) * np.abs(s.eps).max(axis=1)
             clear = (q > size) & (np.abs(e_q) < 1e280 * q)
             safe = np.where(clear, q, 1.0)

@@ -37,7 +37,7 @@ from ..plan import (
 )
 from .closed_text import WORK, wide
 
-__all__ = ["BLOCK", "reduced_text"]
+__all__ = ["BLOCK", "reduced_text", "trial_text"]
 
 BLOCK = 64
 PAIRS = ((1, 2), (2, 0), (0, 1))
@@ -330,6 +330,17 @@ class _Text:
         add(3, "e, x, y, s, t = eps[m], old[m], new[m], stress[m], tangent[min(m, last)]")
         self.finish(3)
         return "\n".join(self.lines) + "\n"
+
+
+def trial_text(size: int, plan: Sequence[int]) -> str:
+    """Text of `trials`, the first part of a reduced step alone: trial numbers, B and its eigenvalues at every point."""
+    text = _Text(size, plan, False)
+    text.add(0, "def trials(eps, old, coefficients, trial, blocks, axes):")
+    text.add(1, '"""Trial numbers at every point; see `fenchel.integrators.kernels.reduced_text`."""')
+    text.add(1, "varying = 1 if coefficients.shape[0] > 1 else 0", "for i in range(eps.shape[0]):")
+    text.add(2, "c, e, x = coefficients[varying * i], eps[i], old[i]")
+    text.trial(2)
+    return "\n".join(text.lines) + "\n"
 
 
 def reduced_text(size: int, plan: Sequence[int], single: bool) -> str:

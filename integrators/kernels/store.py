@@ -8,10 +8,10 @@ from typing import Any
 from ...cache import content_hash, load_text
 from ..key import kernels_hash
 from .closed_text import closed_text
-from .reduced_text import EIGEN, reduced_text
+from .reduced_text import EIGEN, reduced_text, trial_text
 from .terms_text import DERIVATIVE, POSITIVE, terms_text
 
-__all__ = ["step_kernel", "step_text", "terms_kernel"]
+__all__ = ["step_kernel", "step_text", "terms_kernel", "trial_kernel"]
 
 _HEAD = '''"""Written by fenchel.integrators.kernels; do not edit."""
 
@@ -20,7 +20,7 @@ import math
 import numpy as np
 
 from fenchel.cache import njit
-from fenchel.integrators.kernel_types import LAW_SIGNATURE, {signature}
+from fenchel.integrators.kernel_types import {signature}
 from fenchel.integrators.kernels.point import {words}
 {imports}
 FOLDER = __name__
@@ -45,13 +45,20 @@ def _head(body: str, size: int, signature: str, taken: str) -> str:
     head = _HEAD.format(signature=signature, words=", ".join(words), imports=imports, taken=taken)
     if not words:
         head = head.replace("from fenchel.integrators.kernels.point import \n", "")
-    return head.replace("import LAW_SIGNATURE, STEP", "import STEP").replace("LAW_SIGNATURE, LAW_", "LAW_")
+    return head
 
 
 @functools.cache
 def step_kernel(kind: str, size: int, plan: tuple[int, ...], single: bool = False) -> Any:
     """Compiled step for tensors of `size` components and a plan; `single` for arrays of float32."""
     return _loaded(f"{kind}_step", step_text(kind, size, plan, single)).step
+
+
+@functools.cache
+def trial_kernel(size: int, plan: tuple[int, ...]) -> Any:
+    """Compiled trial numbers of a reduced step."""
+    body = trial_text(size, plan)
+    return _loaded("trial_numbers", _head(body, size, "TRIAL_SIGNATURE", "TRIAL_SIGNATURE") + body).trials
 
 
 @functools.cache
