@@ -96,6 +96,7 @@ def drive_arrays(
         if update.law.temperature is None:
             raise InputError(f"law '{update.law.name}' has no temperature; leave the temperatures out")
         given[update.law.temperature.name] = temperatures
+    assert isinstance(update, (Update, StressUpdate))  # what has no tangent went another way
     return _run(update, plan, given, start, initial_state, tolerance, times)
 
 

@@ -147,6 +147,7 @@ def _method(
                     answer[2 * n + k] = 0.0
                 continue
             flag, pinned, weight_q = 1, False, w[0]
+            gram, rate = 0.0, 0.0
             drawable = bool(curved) and not (soft or phi or nr)
             for attempt in range(2):
                 if attempt == 1:

@@ -221,7 +221,7 @@ def strain_array(eps: Any) -> Array:
     return DIMENSIONS["3d"].strains(eps)
 
 
-def packed_values(update: Update, given: Mapping[str, Any]) -> Array:
+def packed_values(update: Any, given: Mapping[str, Any]) -> Array:
     """Parameter values as an array in the order of `law.parameters`, checked against bounds and the conditions of admissibility."""
     return np.array(list(update.law.admissible_values(given).values()), dtype=float)
 
