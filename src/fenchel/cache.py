@@ -1,4 +1,4 @@
-"""Compiled code on disk, keyed by content (the ground floor: it imports nothing of ours).
+"""Compiled code on disk, keyed by content (the ground floor: it imports nothing of ours but the errors).
 
 numba keeps a compiled function as long as *its own* file is unchanged, and so serves stale machine code after an edit of a
 callee in another file. Here the folder is named by a hash of all sources of the package, of Python, numba and the processor,

@@ -34,7 +34,8 @@ def small(tmp_path, monkeypatch):
     for room in ("", "potentials", "integrators", "dem"):
         (package / room).mkdir()
         (package / room / "__init__.py").touch()
-    shutil.copy(Path(cache.__file__), package / "cache.py")
+    for file in ("cache.py", "errors.py"):
+        shutil.copy(Path(cache.__file__).with_name(file), package / file)
     (package / "integrators" / "caller.py").write_text(CALLER)
     return package
 
