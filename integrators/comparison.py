@@ -249,8 +249,9 @@ def _clarabel_error(history: History, tangents: Any) -> float:
     stress, strain = _largest(history)
     if not stress > 0.0:
         return 0.0
-    known = tangents is not None and bool(np.isfinite(tangents).all())
-    stiffness = float(np.linalg.norm(tangents, ord=2, axis=(1, 2)).max()) if known else stress / max(strain, 1e-300)
+    stiffness = stress / max(strain, 1e-300)
+    if tangents is not None and np.isfinite(tangents).all():
+        stiffness = float(np.linalg.norm(tangents, ord=2, axis=(1, 2)).max())
     work = np.abs(np.diff(history.eps, axis=0, prepend=0.0) * history.sig).sum(axis=1)
     energy = float((np.abs(history.psi) + work).max())
     return 2.0 * float(np.sqrt(2.0 * stiffness * CLARABEL * energy)) / stress
