@@ -102,7 +102,7 @@ def spread(rows: int, count: int) -> NDArray[np.intp]:
     """At most `count` of the rows, evenly spread, the last one among them.
 
     >>> spread(7, 3).tolist(), spread(2, 5).tolist()
-    ([2, 4, 6], [0, 1])
+    ([1, 4, 6], [0, 1])
     """
     return np.unique(np.arange(rows, 0, -max(rows / count, 1.0)).round().astype(np.intp) - 1)[-count:]
 
