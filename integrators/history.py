@@ -87,7 +87,7 @@ def drive_arrays(
         raise InputError("drive: initial_strain must be six finite Mandel components")
     if turned:
         start = np.zeros(6)  # only where the search begins: the stress there is not known
-    if isinstance(update, ExplicitUpdate) or not has_tangent(update):
+    if not has_tangent(update):
         return follow_prescribed(update, plan, values, initial_state, time_steps(times, len(plan.base)), temperatures)
     if isinstance(update, GeneralUpdate) or (isinstance(update, StressUpdate) and not update.compiled_path):
         return _run_general(update, plan, values, start, initial_state, times, temperatures)
