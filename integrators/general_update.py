@@ -22,6 +22,7 @@ from .general_step import GeneralStep, StepSolution
 from .packing import StatePacking
 from .sensitivity import Sensitivities, sensitivities
 from .thermal import thermal_input, thermal_results
+from .threads import checked_threads
 
 __all__ = ["GeneralUpdate"]
 
@@ -58,6 +59,7 @@ class GeneralUpdate:
         threads: int = 1,
     ) -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
+        checked_threads(threads)
         declared = declared_step(law, whole=solver != "general" or formulation == "stress")
         found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation, threads)
         found._rehearse()

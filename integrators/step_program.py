@@ -17,7 +17,7 @@ Driven by the stress the strain is one of the unknowns, min over (Îµ, x) of W âˆ
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -119,8 +119,8 @@ class StepProgram:
     state_size: int
     strain_flows: bool
     unbounded: bool
-    whole: Array
-    units: Array
+    whole: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    units: Array = field(default_factory=lambda: np.zeros(0))
     stress: bool = False
 
     def cone_arrays(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], Array, Array]:

@@ -77,8 +77,10 @@ def closed_text(size: int, plan: Sequence[int], single: bool) -> str:
         add(2, f"{row('s')} = {', '.join(f's{i} + c{o + 4} * {x[i]}' for i in n)}")
         add(2, f"trace = {x[0]} + {x[1]} + {x[2]}", f"f += c{o + 1} * trace", f"sphere += c{o + 5} * trace")
     add(2, "# the deviator is removed numerically from the sum, so that its trace vanishes to rounding")
-    add(2, "mean = (b0 + b1 + b2) * THIRD")
-    add(2, f"{row('b', normal)} = {', '.join(f'b{i} - mean' for i in normal)}")
+    # driven by the stress the deviator of a nearly spherical one is a direction: its trace vanishes beside itself
+    for _ in range(2 if terms < 0 else 1):
+        add(2, "mean = (b0 + b1 + b2) * THIRD")
+        add(2, f"{row('b', normal)} = {', '.join(f'b{i} - mean' for i in normal)}")
     add(2, f"q = {' + '.join(f'b{i} * b{i}' for i in n)}")
     add(2, "if 1e-280 < q < 1e280:", "    q = math.sqrt(q)", "else:")
     add(3, f"{', '.join(f'work[{i}]' for i in n)} = {row('b')}", f"q = norm_of(work, {size})")
