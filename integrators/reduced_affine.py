@@ -29,7 +29,7 @@ from .plan import METHOD_START
 __all__ = ["affine_method", "face_table"]
 
 _FOLDER = kernels_hash()
-_IMMOVABLE = 1e300  # weight of an inequality that no flow can change: it holds, or there is no answer
+_IMMOVABLE = 1e200  # weight of an inequality that no flow can change: it holds, or there is no answer
 
 
 @functools.cache
@@ -91,7 +91,7 @@ def _method(n: int, m: int) -> Any:
                 value += c[face + m + m * i + j] * f[j]
             if c[face + i] > 0.0:
                 miss = max(miss, -value)
-            y[i] = max(value, 0.0) * c[face + i]
+            y[i] = max(value, 0.0) * c[face + i] if c[face + i] > 0.0 else 0.0
         for k in range(n):
             e, drop = 0.0, 0.0
             for i in range(m):
