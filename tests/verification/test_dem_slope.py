@@ -143,7 +143,7 @@ solid_fraction = 0.5
 azimuths = 2
 rest = 1e-3
 [grains]
-count = 60
+count = 120
 sizes = "sieve"
 opening = [0.56e-3, 0.8e-3, 1.0e-3]
 passing = [0.0, 0.5, 1.0]
