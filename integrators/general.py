@@ -329,7 +329,7 @@ def _solve_point(p, cones, q, h, alphas, betas, y, lam, tolerance, tau, limit, r
 
 @njit(folder=_FOLDER, nogil=True)
 def _at_rest(cones, y, h1_zero, v, jacobian):
-    """True where y = 0 with every multiplier inside its cone: nothing moves with the data, to first order."""
+    """True where y = 0 with every multiplier inside its cone: G dy = 0, so that nothing moves with the data if G has full column rank."""
     if not h1_zero:
         return False
     for i in range(y.size):
@@ -428,11 +428,11 @@ def _shifted(cones, h1t, v, shift, everywhere, out):
 
 @njit(folder=_FOLDER, nogil=True)
 def _tangent(
-    p, cones, q, h, y, lam, alphas, betas, q1t, h1t, h1_zero, C, dy, dl, step_y, step_l, v, room, jacobian, out,
+    p, cones, q, h, y, lam, alphas, betas, q1t, h1t, h1_zero, pinned, C, dy, dl, step_y, step_l, v, room, jacobian, out,
 ):  # fmt: skip
-    """Tangent at a solution; `v` (m,) is room."""
+    """Tangent at a solution; `pinned` if G has full column rank; `v` (m,) is room."""
     _natural(p, cones, q, h, y, lam, alphas, betas, True, room, jacobian)
-    if _at_rest(cones, y, h1_zero, room.v, jacobian):
+    if pinned and _at_rest(cones, y, h1_zero, room.v, jacobian):
         for i in range(6):
             for c in range(6):
                 out[i, c] = C[i, c]
@@ -479,6 +479,15 @@ def solve_points(
     for k in range(width):
         if _largest(h1t[k]) > 0.0:
             h1_zero = False
+    # guess · G = −𝕀 where the columns of G are independent
+    pinned = True
+    for i in range(n):
+        for j in range(n):
+            number = 1.0 if i == j else 0.0
+            for r in range(m):
+                number += guess[i, r] * G[r, j]
+            if not abs(number) < 1e-8:
+                pinned = False
     for point in range(data.shape[0]):
         for i in range(n):
             q[i] = q0[i]
@@ -534,6 +543,6 @@ def solve_points(
             slopes[point, k] = value
         if want_tangent:
             _tangent(
-                p, cones, q, h, y, lam, shapes, scales, q1t, h1t, h1_zero, C, dy, dl, step_y, step_l, place, room, jacobian,
-                tangents[point],
+                p, cones, q, h, y, lam, shapes, scales, q1t, h1t, h1_zero, pinned, C, dy, dl, step_y, step_l, place, room,
+                jacobian, tangents[point],
             )  # fmt: skip
