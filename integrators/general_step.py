@@ -15,11 +15,13 @@ from numpy.typing import NDArray
 
 from ..errors import DeclarationError, InputError, Status
 from ..potentials import Law
+from ..potentials.derivative import second_derivative
 from .batch import INFEASIBLE, BatchSolution, interior_start, solve_batch
 from .declared import DeclaredStep, declared_step, packed_layout, strain_flows
 from .general import NOT_FINITE, ROUNDING
 from .law_forms import law_forms
 from .step_program import StepProgram, assemble, flow_of_dual, flow_of_rates
+from .strain_energy import operator_matrices
 
 __all__ = ["GeneralStep", "Part", "StepSolution"]
 
@@ -204,7 +206,27 @@ class GeneralStep:
         if temperature is not None:
             known[self.law.temperature] = temperature
         self.declared.strain_energy.add(slopes[:, :6], tangents, known)
+        if tangents is not None:
+            self._elastic(tangents, known, old, np.flatnonzero((status == 0) & ~increment.any(axis=1)))
         return StepSolution(slopes, tangents, increment, residual, status, counts, parts)
+
+    def _elastic(self, tangents: Array, known: Mapping[Any, Any], old: Array, rest: Any) -> None:
+        """∂²ψ/∂ε² at the points `rest` where nothing flows, for φ* an indicator: the derivative there, or the one-sided one on a surface.
+
+        The cone program has it too, but not at coinciding principal values, where the multipliers of its cones are many.
+        """
+        law, step = self.law, self.declared
+        if self.stress or not step.surfaces or step.finite != 0 or step.word != "phi_star" or strain_flows(law):
+            return
+        operator = second_derivative(law.energy, law.observable, law.observable)
+        if operator.extremes or operator.sandwiched or not rest.size:
+            return
+        layout, _ = packed_layout(law)
+        here = {k: v[rest] if np.ndim(v) and len(v) == len(tangents) else v for k, v in known.items()}
+        for variable in law.internal:
+            start, length = layout[variable.name]
+            here[variable] = old[rest, start] if length == 1 else old[rest, start : start + length]
+        tangents[rest] = operator_matrices(operator, here, rest.size)
 
 
 def _increments(program: StepProgram, data: Array, y: Array) -> Array:

@@ -32,6 +32,7 @@ from fenchel.potentials import (
     tr,
     vector,
 )
+from fenchel.potentials.library import ENTRIES, LAWS
 from fenchel.potentials.spectral import from_matrix, to_matrix
 
 I6 = np.array([1.0, 1, 1, 0, 0, 0])
@@ -582,3 +583,15 @@ def test_viscous_terms_of_different_units_beside_a_surface():
     assert max(natural_map(part).max() for part in found.parts) <= 1e-11
     out = update(loads, None, 0.5, certify=True, **values)
     assert (out.gap <= 1e-10 * (np.einsum("ij,ij->i", loads @ C, loads) + YIELD**2 / E)).all()
+
+
+def test_tangent_of_an_elastic_step_at_coinciding_principal_values():
+    """Nothing flows there: the tangent is the elastic stiffness, though the multipliers of the eigenvalue cones are not unique."""
+    law, values = LAWS["mohr_coulomb"], dict(ENTRIES["mohr_coulomb"].values)
+    eps = np.array([[-1.35523e-3, -1.35523e-3, 1.201e-4, 0, 0, 0], [1e-5, -2e-5, 1e-5, 0, 0, 0], [0.0] * 6])
+    out = law.compile(solver="general")(eps, None, **values)
+    assert (out.dissipation == 0.0).all()
+    E, nu = values["E"], values["nu"]
+    unit = np.array([1.0, 1, 1, 0, 0, 0])
+    stiffness = E / (1 + nu) * (np.eye(6) + nu / (1 - 2 * nu) * np.outer(unit, unit))
+    assert np.abs(out.tangent - stiffness).max() <= 1e-12 * stiffness.max()
