@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["DIMENSIONS", "Dimension", "dimension_named"]
+__all__ = ["DIMENSIONS", "Dimension", "dimension_named", "require_space"]
 
 Array = NDArray[np.float64]
 
@@ -99,6 +99,14 @@ DIMENSIONS = {
         Dimension("uniaxial", (0, 1, 2), (0,), (1, 2)),
     )
 }
+
+
+def require_space(update: Any, what: str) -> None:
+    """`InputError` unless an update works on six components in double precision, the only kind that `what` can follow."""
+    dimension, precision = getattr(update, "dimension", DIMENSIONS["3d"]), getattr(update, "precision", "float64")
+    if dimension.name != "3d" or precision != "float64":
+        kind = dimension.name if dimension.name != "3d" else precision
+        raise InputError(f"{what}: the update is compiled for '{kind}'; compile the law for '3d' in float64")
 
 
 def dimension_named(name: str) -> Dimension:

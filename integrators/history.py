@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .dimension import require_space
 from .explicit import ExplicitUpdate
 from .general_path import follow
 from .general_update import GeneralUpdate
@@ -77,6 +78,7 @@ def drive_arrays(
     messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
+    require_space(update, "drive")
     turned = _turned(update)
     plan = path_plan(control, targets, trace, trace_targets, turned)
     try:

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from .dimension import require_space
 from .plan import STRAIN
 from .thermal import thermal_input
 
@@ -90,6 +91,7 @@ def sensitivities(
     """Take the step and differentiate it; see `Update.sensitivities`."""
     from .update import step_time, strain_array
 
+    require_space(update, "sensitivities")
     eps = strain_array(eps_new)
     names = chosen_names(update.law, wrt)
     n, k = len(eps), len(names)

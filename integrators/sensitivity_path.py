@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .dimension import require_space
 from .history import History, drive_arrays
 from .sensitivity import chosen_names, derivatives
 from .thermal import thermal_input
@@ -60,6 +61,7 @@ def path_sensitivities(
     returned for the same arguments, if it is there already. Raises `InputError`, and `ConvergenceError` where the path fails, or where its
     control leaves a rate of strain undetermined, as at a limit load.
     """
+    require_space(update, "path_sensitivities")
     names = chosen_names(update.law, wrt)
     path: dict[str, Any] = {
         "trace": trace,

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from fenchel.errors import InputError
+from fenchel.integrators import drive_arrays, path_sensitivities
 from fenchel.integrators.dimension import DIMENSIONS
+from fenchel.integrators.sensitivity import sensitivities
 from fenchel.integrators.spectral_plane import (
     add_positive_derivative_axes,
     add_positive_derivative_plane,
@@ -238,3 +240,22 @@ def test_wrong_requests_are_refused_in_one_line():
     with pytest.raises(InputError, match=r"must be \(2, 4\)"):
         update = law.compile("plane_strain")
         update(np.zeros((2, 4)), law.compile().initial_state(2), **values_of("sand"))
+
+
+@pytest.mark.parametrize("kind", [{"dimension": "plane_strain"}, {"dimension": "uniaxial"}, {"precision": "float32"}])
+@pytest.mark.parametrize("name", ["sand", "kelvin_voigt"])
+def test_paths_and_sensitivities_take_updates_of_space_only(name, kind):
+    """Their compiled loops hold six components in double precision: fewer would be read past their end."""
+    if name == "kelvin_voigt" and "precision" in kind:
+        kind = {"dimension": "axisymmetric"}
+    update, values = LAWS[name].compile(**kind), values_of(name)
+    targets = np.zeros((3, 6))
+    targets[1:, 2] = -1e-3
+    control = np.array([True, True, False, True, True, True])
+    for attempt in (
+        lambda: drive_arrays(update, control, targets, values),
+        lambda: path_sensitivities(update, control, targets, values),
+        lambda: sensitivities(update, np.zeros((2, len(update.dimension.given))), None, 1.0, None, None, None, values),
+    ):
+        with pytest.raises(InputError, match="compile the law for '3d' in float64"):
+            attempt()
