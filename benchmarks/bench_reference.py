@@ -15,7 +15,7 @@ import numpy as np
 from bench_step import COUNT, copied, seconds
 from handwritten import drucker_prager_by_hand
 
-from fenchel.integrators.update import packed_values
+from fenchel.integrators.compiled_step import packed_values
 from fenchel.potentials.library import ENTRIES, sand
 
 ROUNDS = 9

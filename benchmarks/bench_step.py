@@ -72,8 +72,8 @@ def half_plastic(update, base, state, direction, values):
 
 def driven_by_stress(name, rng):
     """Print two lines for a law in the stress formulation."""
+    from fenchel.integrators.compiled_step import packed_values
     from fenchel.integrators.thermal import thermal_input
-    from fenchel.integrators.update import packed_values
 
     law, entry = LAWS[name], ENTRIES[name]
     strain, update = law.compile(), law.compile(formulation="stress")
@@ -120,8 +120,8 @@ def main() -> None:
             scale = float(np.sqrt(low * high))
         eps *= scale
         pointers = update.pointers
+        from fenchel.integrators.compiled_step import packed_values
         from fenchel.integrators.thermal import thermal_input
-        from fenchel.integrators.update import packed_values
 
         heat, rest = thermal_input(law, values, COUNT)
         rows = pointers.coefficients(packed_values(update, rest), 1.0, heat.temperature)

@@ -11,8 +11,9 @@ from .path_file import StrainStressPath, read_path, write_history
 from .sensitivity import Sensitivities
 from .sensitivity_path import PathSensitivities, path_sensitivities
 from .step_order import StepOrder
+from .step_result import StepResult
 from .stress_update import StressUpdate
-from .update import StepResult, Update, build_update
+from .update import Update, build_update
 
 __all__ = [
     "Comparison",

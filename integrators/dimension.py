@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 
-__all__ = ["DIMENSIONS", "Dimension", "dimension_named", "require_space"]
+__all__ = ["DIMENSIONS", "SPACE", "Dimension", "dimension_named", "require_space"]
 
 Array = NDArray[np.float64]
 
@@ -43,6 +43,12 @@ class Dimension:
         """Strains (n, size) from what the user gives; relaxed components begin at zero. `InputError` for other shapes and values."""
         inside = (0, 1, 3) if self.name == "plane_strain" and np.shape(given)[-1:] == (3,) else self.given
         return self._full("eps_new", given, inside)
+
+    def complete(self, eps: Any) -> Array:
+        """Strains (n, size) from all components, or from the given ones as `strains`."""
+        if np.shape(eps)[-1:] == (self.size,):
+            return self._full("eps_new", eps, tuple(range(self.size)))
+        return self.strains(eps)
 
     def stresses(self, given: Any) -> Array:
         """Stresses (n, size) from what the user gives; those that are relaxed are zero."""
@@ -101,9 +107,12 @@ DIMENSIONS = {
 }
 
 
+SPACE = DIMENSIONS["3d"]
+
+
 def require_space(update: Any, what: str) -> None:
     """`InputError` unless an update works on six components in double precision, the only kind that `what` can follow."""
-    dimension, precision = getattr(update, "dimension", DIMENSIONS["3d"]), getattr(update, "precision", "float64")
+    dimension, precision = getattr(update, "dimension", SPACE), getattr(update, "precision", "float64")
     if dimension.name != "3d" or precision != "float64":
         kind = dimension.name if dimension.name != "3d" else precision
         raise InputError(f"{what}: the update is compiled for '{kind}'; compile the law for '3d' in float64")

@@ -25,7 +25,8 @@ from ..potentials.derivative import partial
 from ..potentials.evaluate import evaluate
 from ..potentials.scalars import ScalarVariable
 from .declared import components
-from .update import StepResult, strain_array
+from .dimension import SPACE
+from .step_result import StepResult
 
 __all__ = ["ExplicitUpdate", "Integration"]
 
@@ -86,7 +87,7 @@ class ExplicitUpdate:
             )
         if not (np.isfinite(dt) and dt > 0):
             raise InputError(f"dt = {dt}: the time step must be positive and finite")
-        goal = strain_array(eps_new)
+        goal = SPACE.strains(eps_new)
         return Integration(
             self, self.law.admissible_values(values), goal, self._packed(state, len(goal)), float(dt)
         ).run()

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .compiled_step import packed_values
 from .general_step import StepSolution
 from .general_update import GeneralUpdate
 from .stress_update import StressUpdate
@@ -69,8 +70,6 @@ class _Steps:
         return _Answer(answer[0], tangent[0], int(found.status[0]), new, float(lost[0]), found)
 
     def _inverse(self, update: StressUpdate, row: int, driven: Array, old: Array) -> _Answer:
-        from .update import packed_values
-
         heat, rest = thermal_input(update.law, self.given(row), 1)
         rows = update.coefficients(packed_values(update, rest), float(self.times[row]), heat.temperature)
         new, eps, compliance, lost = np.empty_like(old), np.empty((1, 6)), np.empty((1, 36)), np.empty(1)

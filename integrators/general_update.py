@@ -18,9 +18,12 @@ from ..errors import DeclarationError, InputError
 from ..potentials import Law
 from ..potentials.evaluate import evaluate
 from .declared import DeclaredStep, components, declared_step
+from .dimension import SPACE
+from .failures import raise_failures
 from .general_step import GeneralStep, StepSolution
 from .packing import StatePacking
 from .sensitivity import Sensitivities, sensitivities
+from .step_result import StepResult
 from .thermal import thermal_input, thermal_results
 from .threads import checked_threads
 
@@ -93,16 +96,13 @@ class GeneralUpdate:
         Raises `InputError` for bad input, for values at which ψ or φ* is not convex and where f(0) > 0, and `ConvergenceError`, naming the
         first points, where the step has no solution or none is found.
         """
-        from .stress_input import raise_stress_failures, stress_array
-        from .update import StepResult, raise_failures, strain_array
-
-        driven = stress_array(eps_new) if self.turned else strain_array(eps_new)
+        driven = SPACE.stresses(eps_new) if self.turned else SPACE.strains(eps_new)
         old = self.packing.pack(state, len(driven))
         heat, given = thermal_input(self.law, values, len(driven))
         numbers = self.law.admissible_values(given)
         temperature = heat.temperature if self.law.temperature is not None else None
         found, gap = self.solve(driven, old, dt, numbers, temperature), None
-        (raise_stress_failures if self.turned else raise_failures)(found.status, driven)
+        raise_failures(found.status, driven, self.formulation)
         answer, tangent = self.response(found)
         eps, stress = (answer, driven) if self.turned else (driven, answer)
         new, lost = self.outcome(eps, old, found)
@@ -190,9 +190,7 @@ class GeneralUpdate:
 
     def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
         """Free energy ψ [J/m³] at the given strains and internal variables, shape (n,)."""
-        from .update import strain_array
-
-        strain = strain_array(eps)
+        strain = SPACE.strains(eps)
         packed = self.packing.pack(state, len(strain))
         numbers, temperature = self.arguments(values, len(strain))
         known: dict[Any, Any] = {p: numbers[p.name] for p in self.law.parameters}

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .compiled_step import packed_values
 from .dimension import require_space
 from .explicit import ExplicitUpdate
 from .general_path import follow
@@ -26,10 +27,11 @@ from .prescribed_path import follow_prescribed, has_tangent
 from .stress_path import stress_plan
 from .stress_update import StressUpdate
 from .thermal import thermal_input, thermal_results
-from .update import Array, Update, packed_values
+from .update import Update
 
 __all__ = ["History", "Plan", "drive_arrays", "path_plan", "time_steps"]
 
+Array = NDArray[np.float64]
 TOLERANCE = 1e-12
 TURNS = 60
 

@@ -16,7 +16,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
-from .dimension import require_space
+from .compiled_step import packed_values, step_time
+from .dimension import SPACE, require_space
+from .failures import raise_failures
 from .plan import STRAIN
 from .thermal import thermal_input
 
@@ -89,10 +91,8 @@ def sensitivities(
     values: Mapping[str, Any],
 ) -> Sensitivities:
     """Take the step and differentiate it; see `Update.sensitivities`."""
-    from .update import step_time, strain_array
-
     require_space(update, "sensitivities")
-    eps = strain_array(eps_new)
+    eps = SPACE.strains(eps_new)
     names = chosen_names(update.law, wrt)
     n, k = len(eps), len(names)
     old = update.packing.pack(state, n)
@@ -140,7 +140,6 @@ def _reduced(
     from .sensitivity_answer import reduced_answer
     from .sensitivity_points import StepData, taken
     from .sensitivity_reduced import step_derivatives
-    from .update import packed_values, raise_failures
 
     closed = update.module.METHOD == "closed"
     if update.module.PLAN[2 if closed else STRAIN] < 0:

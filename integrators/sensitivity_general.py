@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from ..errors import DeclarationError
 from .batch import ROUNDING, solve_whole
 from .cone_projection import ORTHANT, SEMIDEFINITE, project
+from .failures import raise_failures
 from .general_step import GeneralStep, Part
 from .program_slopes import SPACING, ProgramSlopes, central_difference
 from .sensitivity_strain import add_declared_energy
@@ -44,8 +45,6 @@ def general_derivatives(
     d_eps: Array,
 ) -> tuple[Array, Array, Array]:
     """See `sensitivity.derivatives`; the packed state ends with the old strain where the law has a force of its observable."""
-    from .update import raise_failures
-
     n, width = len(eps), d_eps.shape[2]
     heat, given = thermal_input(update.law, values, n)
     numbers = update.law.admissible_values(given)
@@ -90,8 +89,6 @@ class _Group:
             self.solved[k] = points, found
 
     def derivatives(self, d_old: Array, d_eps: Array) -> tuple[Array, Array, Array]:
-        from .update import raise_failures
-
         count, width = len(self.eps), d_eps.shape[2]
         d_rows = self._row_slopes(d_old)
         wide = self.old.shape[1]

@@ -11,9 +11,8 @@ unknown (`general_update`).
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -21,13 +20,14 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..potentials import Law
+from .compiled_step import CompiledStep, packed_values, step_time
 from .declared import state_layout
+from .failures import raise_failures
 from .inverse_step import InversePointers, inverse_pointers
 from .module_store import load_module
-from .packing import StatePacking
 from .pointers import StepPointers, step_pointers
 from .points import run_points
-from .stress_input import raise_stress_failures, stress_array
+from .step_result import StepResult
 from .structure import NoReduction, find_moduli
 from .thermal import thermal_input, thermal_results
 
@@ -37,40 +37,16 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class StressUpdate:
+class StressUpdate(CompiledStep):
     """Compiled step of `law` from stresses; `layout` gives the place of each internal variable in a packed state row.
 
     `inverse` is false if `module` holds the numbers of −ψ*, and true if it holds those of ψ, whose step is inverted.
     """
 
-    law: Law
-    module: ModuleType
-    tangent: bool = True
-    solver: str = "closed"
-    layout: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    state_size: int = 0
-    why: str = ""
     inverse: bool = False
     threads: int = 1
 
     formulation = "stress"
-
-    @cached_property
-    def packing(self) -> StatePacking:
-        """The state by name and in packed rows."""
-        return StatePacking(self.law, self.layout, self.state_size)
-
-    def initial_state(self, point_count: int = 1) -> dict[str, Array]:
-        """Virgin state: all internal variables zero."""
-        return self.packing.initial_state(point_count)
-
-    def unpack(self, packed: Array) -> dict[str, Array]:
-        """Views of a packed state (n, state_size) by name."""
-        return self.packing.unpack(packed)
-
-    def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
-        """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""
-        return self.packing.pack(state, point_count)
 
     @cached_property
     def pointers(self) -> StepPointers | InversePointers:
@@ -100,9 +76,7 @@ class StressUpdate:
         `Update.__call__`. Raises `InputError` for bad input and `ConvergenceError`, naming the first points, where the step fails: a
         stress that cannot be carried has the status `INFEASIBLE`.
         """
-        from .update import StepResult, packed_values, step_time
-
-        sig = stress_array(sig_new)
+        sig = self.dimension.stresses(sig_new)
         n = sig.shape[0]
         heat, values = thermal_input(self.law, values, n)
         packed_parameters = packed_values(self, values)
@@ -111,7 +85,7 @@ class StressUpdate:
         new, eps, compliance, dissipation, status = run_points(
             self.pointers, sig, old, coefficients, self.tangent, threads=self.threads
         )
-        raise_stress_failures(status, sig)
+        raise_failures(status, sig, "stress")
         gap = None
         if certify:
             from .stress_certificate import stress_gap
@@ -132,21 +106,6 @@ class StressUpdate:
                 "use the strain formulation"
             )
         return found
-
-    def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
-        """Free energy ρψ [J/m³] at the given strains and internal variables, shape (n,)."""
-        from .update import packed_values, strain_array
-
-        strain = strain_array(eps)
-        heat, values = thermal_input(self.law, values, strain.shape[0])
-        packed = self.pack(state, strain.shape[0])
-        return self.energies(strain, packed, heat.temperature, packed_values(self, values))
-
-    def energies(self, eps: Array, packed: Array, temperature: Array, parameters: Array) -> Array:
-        """ρψ [J/m³] of packed states, shape (n,)."""
-        psi = np.empty(eps.shape[0])
-        self.module.energies_(eps, packed, temperature, parameters, psi)
-        return psi
 
 
 def build_stress_update(law: Law, solver: str = "auto", tangent: bool = True, threads: int = 1) -> Any:
@@ -173,9 +132,9 @@ def _reduced(law: Law, solver: str, tangent: bool, threads: int) -> StressUpdate
     if not module.STRAIN_ENERGY:
         module = load_module(law, solver, formulation="stress")
         why = f"{module.WHY}; psi is quadratic in the strain, so its conjugate has the same step"
-        return StressUpdate(law, module, tangent, method, layout, size, why, False, threads)
+        return StressUpdate(law, module, tangent, method, layout, size, why, threads=threads)
     c0, c1 = find_moduli(law).strain
     if c0 == 0 or (c0 + 3 * c1) == 0:
         raise NoReduction(f"law '{law.name}': psi has no quadratic energy that resists every strain")
     why = f"{module.WHY}; with an energy of the strain alone, its inverse is found by Newton's method"
-    return StressUpdate(law, module, tangent, method, layout, size, why, True, threads)
+    return StressUpdate(law, module, tangent, method, layout, size, why, inverse=True, threads=threads)

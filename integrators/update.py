@@ -8,18 +8,19 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cached_property
-from types import ModuleType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import ConvergenceError, DeclarationError, InputError, Status
+from ..errors import DeclarationError, InputError
 from ..potentials import Law
+from .compiled_step import CompiledStep, packed_values, step_time
 from .declared import state_layout
-from .dimension import DIMENSIONS, Dimension, dimension_named
+from .dimension import dimension_named
+from .failures import raise_failures
 from .kernels import step_text
 from .module_store import load_module
 from .packing import StatePacking
@@ -27,11 +28,12 @@ from .pointers import StepPointers, step_pointers
 from .points import run_points
 from .relaxed import Evaluation, condensed, relax
 from .sensitivity import Sensitivities, sensitivities
+from .step_result import StepResult
 from .structure import NoReduction
 from .thermal import ThermalData, thermal_input, thermal_results
 from .threads import checked_threads
 
-__all__ = ["StepResult", "Update", "build_update", "packed_values", "step_time"]
+__all__ = ["Update", "build_update"]
 
 Array = NDArray[np.float64]
 REDUCED = ("closed", "reduced", "principal")
@@ -40,58 +42,11 @@ EXPLICIT = "explicit"
 
 
 @dataclass(frozen=True)
-class StepResult:
-    """Result of one step at n points.
+class Update(CompiledStep):
+    """Compiled implicit step of a law, driven by the strain; `precision` of its arrays, `threads` that share the points."""
 
-    `stress` [Pa] (n, m) and `tangent` ∂σ/∂ε [Pa] (n, m, m) in Mandel components, m = 6 or those of the dimension; `state` by name,
-    tensors (n, 6), scalars (n,); `dissipation` of the step [J/m³] (n,), mechanical; `status` (n,) of `Status` codes; `gap` [J/m³] (n,),
-    primal minus dual, if certified. `strain` [-] (n, 6) at the end of the step: the given one and what follows from a stress of zero, or in
-    the stress formulation the answer, with `tangent` ∂ε/∂σ [1/Pa]. Of a law with a temperature: `entropy` [J/(m³ K)] (n,), and `flux` −q/T
-    [W/(m² K)] (n, 3) if φ* mentions the gradient of temperature. Tensors of a state and strains have the components of `Dimension`.
-    """
-
-    stress: Array
-    tangent: Array | None
-    state: dict[str, Array]
-    dissipation: Array
-    status: NDArray[np.int64]
-    gap: Array | None = None
-    entropy: Array | None = None
-    flux: Array | None = None
-    strain: Array | None = None
-
-
-@dataclass(frozen=True)
-class Update:
-    """Compiled implicit step of `law`; `layout` gives the place of each internal variable in a packed state row."""
-
-    law: Law
-    module: ModuleType
-    tangent: bool = True
-    solver: str = "closed"
-    layout: Mapping[str, tuple[int, int]] = field(default_factory=dict)
-    state_size: int = 0
-    why: str = ""
-    dimension: Dimension = DIMENSIONS["3d"]
     precision: str = "float64"
     threads: int = 1
-
-    @cached_property
-    def packing(self) -> StatePacking:
-        """The state by name and in packed rows."""
-        return StatePacking(self.law, self.layout, self.state_size)
-
-    def initial_state(self, point_count: int = 1) -> dict[str, Array]:
-        """Virgin state: all internal variables zero."""
-        return self.packing.initial_state(point_count)
-
-    def unpack(self, packed: Array) -> dict[str, Array]:
-        """Views of a packed state (n, state_size) by name."""
-        return self.packing.unpack(packed)
-
-    def pack(self, state: Mapping[str, Any] | None, point_count: int) -> Array:
-        """Packed copy of a state by name; None is the virgin state. `InputError` for unknown names, shapes and NaN."""
-        return self.packing.pack(state, point_count)
 
     @cached_property
     def pointers(self) -> StepPointers:
@@ -192,56 +147,6 @@ class Update:
         `d_eps` (n, 6, k) are the derivatives of the old state and of the strain, zero if not given. Raises as the step does.
         """
         return sensitivities(self, eps_new, state, dt, wrt, d_state, d_eps, values)
-
-    def energy(self, eps: Any, state: Mapping[str, Any] | None = None, /, **values: Any) -> Array:
-        """Free energy ρψ [J/m³] at strains (all components of the dimension) and internal variables, shape (n,)."""
-        strain = np.atleast_2d(np.asarray(eps, dtype=float))
-        if strain.shape[-1] != self.dimension.size:
-            strain = self.dimension.strains(eps)
-        heat, values = thermal_input(self.law, values, strain.shape[0])
-        packed = self.pack(state, strain.shape[0])
-        return self.energies(strain, packed, heat.temperature, packed_values(self, values))
-
-    def energies(self, eps: Array, packed: Array, temperature: Array, parameters: Array) -> Array:
-        """ρψ [J/m³] of packed states, shape (n,)."""
-        psi = np.empty(eps.shape[0])
-        self.module.energies_(eps, packed, temperature, parameters, psi)
-        return psi
-
-
-def step_time(dt: Any) -> float:
-    """The time step [s], checked."""
-    if not (np.ndim(dt) == 0 and np.isfinite(dt) and dt > 0):
-        raise InputError(f"dt = {dt}: the time step must be positive and finite")
-    return float(dt)
-
-
-def strain_array(eps: Any) -> Array:
-    """Strains as a contiguous (n, 6) array; refuses other shapes and values that are not finite."""
-    return DIMENSIONS["3d"].strains(eps)
-
-
-def packed_values(update: Any, given: Mapping[str, Any]) -> Array:
-    """Parameter values as an array in the order of `law.parameters`, checked against bounds and the conditions of admissibility."""
-    return np.array(list(update.law.admissible_values(given).values()), dtype=float)
-
-
-def raise_failures(status: NDArray[np.int64], eps: Array) -> None:
-    """`ConvergenceError` that names the first failing points."""
-    failed = np.flatnonzero(status)
-    if failed.size == 0:
-        return
-    first = ", ".join(str(int(i)) for i in failed[:5])
-    reason = {
-        Status.NOT_FINITE: "stress or dissipation is not finite",
-        Status.INFEASIBLE: "no plastically admissible stress",
-        Status.ITERATION_LIMIT: "iteration limit",
-    }
-    word = reason.get(Status(int(status[failed[0]])), "failure")
-    strain = np.array2string(eps[failed[0]], precision=6, max_line_width=1000)
-    raise ConvergenceError(
-        f"the step fails at {failed.size} of {status.size} points ({word}), first {first}; strain of the first: {strain}"
-    )
 
 
 def build_update(

@@ -9,7 +9,7 @@ import pytest
 from sympy import sqrt, tan
 
 from fenchel.errors import InputError
-from fenchel.integrators.update import packed_values
+from fenchel.integrators.compiled_step import packed_values
 from fenchel.potentials import (
     Law,
     dev,
