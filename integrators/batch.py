@@ -12,10 +12,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from .compact import Compact
 from .cone_projection import EXPONENTIAL, EXPONENTIAL_DUAL, ORTHANT, POWER, POWER_DUAL, SECOND_ORDER, SEMIDEFINITE
 from .general import ITERATION_LIMIT, ROUNDING, solve_points
 from .scalar_terms import POWER_TERM
 from .step_program import StepProgram
+from .threads import shared
 
 __all__ = [
     "INFEASIBLE",
@@ -25,7 +27,6 @@ __all__ = [
     "run_interior",
     "slopes_of",
     "solve_batch",
-    "solve_whole",
 ]
 
 Array = NDArray[np.float64]
@@ -85,20 +86,15 @@ def run_engine(
         tau = TERM_TAU if any(cone.kind >= POWER_TERM for cone in program.cones) else TAU
     arrays, data = program.engine_arrays, np.ascontiguousarray(data)
 
-    def run(rows: slice) -> None:
+    def run(first: int, last: int) -> None:
+        rows = slice(first, last)
         solve_points(
             *arrays, data[rows], start is not None, y[rows], multipliers[rows], slopes[rows],
             tangents[rows] if tangent else tangents, tangent, residual[rows], status[rows], counts[rows], turns[rows],
             tolerance, tau, STEPS,
         )  # fmt: skip
 
-    if threads == 1 or count <= CHUNK:
-        run(slice(0, count))
-    else:
-        from concurrent.futures import ThreadPoolExecutor
-
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(run, [slice(a, min(a + CHUNK, count)) for a in range(0, count, CHUNK)]))
+    shared(run, count, threads, CHUNK)
     found = tangents if tangent else None
     return BatchSolution(y, multipliers, slopes, found, residual, status, counts, turns, np.ones(count, dtype=np.int64))
 
@@ -111,12 +107,14 @@ def solve_batch(
     tolerance: float = 1e-13,
     start: tuple[Array, Array] | None = None,
     threads: int = 1,
+    form: Compact | None = None,
 ) -> BatchSolution:
     """The engine on the compact form of `program`; points where it stops short again with other penalties, then from clarabel's answer.
 
-    Unknowns and multipliers, also those of `start`, are those of the compact form.
+    Unknowns and multipliers, also those of `start`, are those of the compact form, or of another `form`.
     """
-    small = program.compact.program
+    chosen: Compact = program.compact if form is None else form
+    small = chosen.program
     found = run_engine(small, data, tangent=tangent, tolerance=tolerance, start=start, threads=threads)
     for tau in OTHER_TAUS:
         left = np.flatnonzero(found.status > ROUNDING)
@@ -125,7 +123,7 @@ def solve_batch(
         _again(found, left, small, data, tangent=tangent, tolerance=tolerance, tau=tau, threads=threads)
     left = np.flatnonzero(found.status > ROUNDING)
     if left.size:
-        begin, infeasible = interior_start(program, data[left])
+        begin, infeasible = interior_start(program, data[left], chosen)
         _again(found, left, small, data, tangent=tangent, tolerance=tolerance, start=begin, tau=1e3, threads=threads)
         failed = infeasible & (found.status[left] > ROUNDING)
         found.status[left[failed]] = INFEASIBLE
@@ -158,21 +156,12 @@ def _take(found: BatchSolution, rows: NDArray[np.int64], other: BatchSolution, m
     found.take(rows, part)
 
 
-def interior_start(program: StepProgram, data: Array) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
-    """clarabel's answers as a start of the compact form, and where it says infeasible."""
+def interior_start(
+    program: StepProgram, data: Array, form: Compact | None = None
+) -> tuple[tuple[Array, Array], NDArray[np.bool_]]:
+    """clarabel's answers as a start of the compact form, or of another, and where it says infeasible."""
     y, multipliers, infeasible = run_interior(program, data)
-    return program.compact.start(y, multipliers), infeasible
-
-
-def solve_whole(program: StepProgram, data: Array) -> BatchSolution:
-    """The engine on `program` itself, nothing left out; points where it stops short once more from clarabel's answer."""
-    found = run_engine(program, data, tangent=False)
-    left = np.flatnonzero(found.status > ROUNDING)
-    if left.size:
-        y, multipliers, _ = run_interior(program, data[left])
-        again = run_engine(program, data[left], tangent=False, start=(y, multipliers), tau=1e3)
-        found.take(left, again)
-    return found
+    return (program.compact if form is None else form).start(y, multipliers), infeasible
 
 
 def slopes_of(program: StepProgram, data: Array, y: Array, multipliers: Array) -> Array:

@@ -38,6 +38,11 @@ class Compact:
     unknowns: NDArray[np.float64]
     rows: NDArray[np.float64]
 
+    @classmethod
+    def whole(cls, program: StepProgram) -> Compact:
+        """The form that leaves everything as it is."""
+        return cls(program, np.eye(program.p.size), np.eye(program.h0.size))
+
     def start(self, y: NDArray[np.float64], multipliers: NDArray[np.float64]) -> tuple[Any, Any]:
         """Unknowns and multipliers (N, ·) of the conic program as those of the compact one."""
         return y @ self.unknowns.T, multipliers @ self.rows.T

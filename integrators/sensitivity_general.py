@@ -20,7 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import DeclarationError
-from .batch import ROUNDING, solve_whole
+from .batch import ROUNDING, solve_batch
+from .compact import Compact
 from .cone_projection import ORTHANT, SEMIDEFINITE, project
 from .failures import raise_failures
 from .general_step import GeneralStep, Part
@@ -112,7 +113,7 @@ class _Group:
             d_data = np.concatenate([d_eps[points], d_old[points]], axis=1)
             base = slopes.base
             # the program as it is assembled: what the compact form leaves out has a derivative too
-            whole = solve_whole(program, part.data)
+            whole = solve_batch(program, part.data, tangent=False, form=Compact.whole(program))
             raise_failures(np.where(whole.status > ROUNDING, 1, 0), self.eps[points])
             one = _Solution(program, base, Part(part.points, program, part.data, whole)).answered(changes, d_data)
             d_slope, d_step = one

@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
 from .dimension import require_space
-from .history import History, drive_arrays
+from .general_update import GeneralUpdate
+from .history import History, drive_arrays, path_plan, time_steps
 from .sensitivity import chosen_names, derivatives
 from .thermal import thermal_input
 
@@ -85,41 +86,12 @@ def path_sensitivities(
     if temperatures is not None:
         given[update.law.temperature.name] = temperatures
     thermal_input(update.law, given, n)
-    parts = derivatives(update, found.eps, old, _time_steps(update, times, n), given, names, d_old, d_eps)
-    directions, rows = _directions(np.asarray(control, dtype=bool), targets, trace)
-    return _followed(names, found, update.packing, parts, directions, rows)
-
-
-def _time_steps(update: Any, times: Any, count: int) -> Any:
-    """Time steps as `drive_arrays` takes them: the first row takes the first difference."""
-    if times is None:
-        return 1.0
-    steps = np.diff(np.asarray(times, dtype=float))
-    steps = np.concatenate([steps[:1] if steps.size else [1.0], steps])
-    module = getattr(update, "module", None)
-    return steps if module is None or module.VISCOUS else 1.0
-
-
-def _directions(control: NDArray[np.bool_], targets: Any, trace: str | None) -> tuple[Array, Array]:
-    """Z (6, m), a basis of the strains that are not prescribed, and V (m, 6), the conditions on the stress."""
-    unit = np.eye(6)
-    free = np.zeros(6, dtype=bool)
-    if trace is not None:
-        free[:3] = np.isnan(np.atleast_2d(np.asarray(targets, dtype=float))[:, :3]).all(axis=0)
-    rows = [unit[i] for i in np.flatnonzero(control & ~free)]
-    shared = np.flatnonzero(free)
-    rows += [unit[i] - unit[shared[0]] for i in shared[1:]]
-    sphere = np.array([1.0, 1.0, 1.0, 0.0, 0.0, 0.0])
-    held = [unit[i] for i in np.flatnonzero(~control & ~free)]
-    if trace == "eps_v":
-        held.append(sphere)
-    elif trace == "p":
-        rows.append(-sphere / 3.0)
-    if not held:
-        return unit, np.array(rows).reshape(-1, 6)
-    values = np.array(held)
-    _, s, vt = np.linalg.svd(values)
-    return vt[int((s > 1e-12).sum()) :].T, np.array(rows).reshape(-1, 6)
+    viscous = isinstance(update, GeneralUpdate) or update.module.VISCOUS
+    steps = time_steps(times, n) if viscous and times is not None else 1.0
+    parts = derivatives(update, found.eps, old, steps, given, names, d_old, d_eps)
+    # where the path goes does not depend on the values of its condition
+    plan = path_plan(control, targets, trace, None if trace is None else np.zeros(n), False)
+    return _followed(names, found, update.packing, parts, plan.z, plan.v)
 
 
 def _followed(

@@ -264,7 +264,7 @@ class _Text:
         """C − G P G with G = g₀ 𝕀 + g₁ I⊗I in principal values, and the quotients on the mixed dyads."""
         add, n, size, count = self.add, self.n, self.size, self.unknowns
         first = 2 * count
-        pairs = [p for p in PAIRS if self._mixed(*p)]
+        pairs = PAIRS if size > 3 else ()  # a diagonal tensor has no mixed components
         names = {(k, l): f"p{min(k, l)}{max(k, l)}" for k in range(3) for l in range(3)}
         add(depth, "g_0, g_1 = c[3], c[4]")
         if pairs:
@@ -299,10 +299,6 @@ class _Text:
                 value = f"-({value})" if sign else value
                 mirror = f" = {stiff}[{size * j + i}]" if i != j else ""
                 add(depth, f"{stiff}[{size * i + j}]{mirror} = {value}")
-
-    def _mixed(self, k: int, l: int) -> bool:
-        """Whether the mixed dyad of two axes has components that exist."""
-        return self.size > 3
 
     def whole(self) -> str:
         add, count, size = self.add, self.unknowns, self.size

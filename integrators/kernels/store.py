@@ -21,12 +21,11 @@ import numpy as np
 
 from fenchel.cache import njit
 from fenchel.integrators.kernel_types import {signature}
-from fenchel.integrators.kernels.point import {words}
 {imports}
 FOLDER = __name__
 
 
-@njit(folder=FOLDER, signature_or_function={taken}, nogil=True)
+@njit(folder=FOLDER, signature_or_function={signature}, nogil=True)
 '''
 _SPECTRAL = {6: "spectral", 4: "spectral_plane", 3: "spectral_plane"}
 
@@ -34,18 +33,16 @@ _SPECTRAL = {6: "spectral", 4: "spectral_plane", 3: "spectral_plane"}
 def step_text(kind: str, size: int, plan: tuple[int, ...], single: bool) -> str:
     """Text of the module of a step; `kind` is "closed" or "reduced"."""
     body = (closed_text if kind == "closed" else reduced_text)(size, plan, single)
-    signature = "STEP_SIGNATURE_32" if single else "STEP_SIGNATURE"
-    return _head(body, size, signature, signature) + body
+    return _head(body, size, "STEP_SIGNATURE_32" if single else "STEP_SIGNATURE") + body
 
 
-def _head(body: str, size: int, signature: str, taken: str) -> str:
+def _head(body: str, size: int, signature: str) -> str:
+    """Head of a module that imports what its body calls."""
     words = [w for w in ("ROOT", "THIRD", "descending", "norm_of", "size_of", "theta") if w in body]
     called = [w for w in (EIGEN[size], POSITIVE[size], DERIVATIVE[size]) if f"{w}(" in body]
-    imports = f"from fenchel.integrators.{_SPECTRAL[size]} import {', '.join(called)}\n" if called else ""
-    head = _HEAD.format(signature=signature, words=", ".join(words), imports=imports, taken=taken)
-    if not words:
-        head = head.replace("from fenchel.integrators.kernels.point import \n", "")
-    return head
+    imports = f"from fenchel.integrators.kernels.point import {', '.join(words)}\n" if words else ""
+    imports += f"from fenchel.integrators.{_SPECTRAL[size]} import {', '.join(called)}\n" if called else ""
+    return _HEAD.format(signature=signature, imports=imports)
 
 
 @functools.cache
@@ -58,14 +55,14 @@ def step_kernel(kind: str, size: int, plan: tuple[int, ...], single: bool = Fals
 def trial_kernel(size: int, plan: tuple[int, ...]) -> Any:
     """Compiled trial numbers of a reduced step."""
     body = trial_text(size, plan)
-    return _loaded("trial_numbers", _head(body, size, "TRIAL_SIGNATURE", "TRIAL_SIGNATURE") + body).trials
+    return _loaded("trial_numbers", _head(body, size, "TRIAL_SIGNATURE") + body).trials
 
 
 @functools.cache
 def terms_kernel(size: int) -> Any:
     """Compiled unilateral energies of the strain, a `rest` of a step."""
     body = terms_text(size)
-    return _loaded("strain_terms", _head(body, size, "LAW_SIGNATURE", "LAW_SIGNATURE") + body).terms
+    return _loaded("strain_terms", _head(body, size, "LAW_SIGNATURE") + body).terms
 
 
 def _loaded(kind: str, text: str) -> Any:
