@@ -6,6 +6,7 @@ from pathlib import Path
 
 import typer
 
+from .campaign import JOBS, SCHEDULER
 from .signs import SIGNS, Signs
 
 __all__ = ["register"]
@@ -22,9 +23,8 @@ def _identify(
         ..., "-o", "--output", metavar="DIR", help="The folder of the report, law and run files."
     ),
     demo: bool = typer.Option(False, "--demo", help="Take the study that fenchel carries."),
-    jobs: int | None = typer.Option(
-        None, "--jobs", min=1, help="How many runs go on at the same time; default: all cores."
-    ),
+    jobs: int | None = JOBS,
+    scheduler: str | None = SCHEDULER,
     signs: Signs = SIGNS,
     quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the numbers of the report as JSON."),
@@ -43,7 +43,7 @@ def _identify(
         raise InputError("identify takes either a study file or --demo: fenchel identify STUDY.toml -o DIR")
     from fenchel.identify.job import run_study
 
-    run_study(study, output, jobs=jobs, show=not quiet, signs=signs.value)
+    run_study(study, output, jobs=jobs, scheduler=scheduler, show=not quiet, signs=signs.value)
     if json_wanted:
         typer.echo((output / "report.json").read_text(encoding="utf-8"))
     else:

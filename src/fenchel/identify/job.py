@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 import platform
 import sys
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
@@ -15,21 +14,19 @@ from typing import Any
 import msgspec
 
 from .. import __version__
+from ..campaign import run_campaign
 from ..dem.bodies import Assembly
 from ..dem.record import TriaxialRecord
 from ..dem.storage import load_run, replace_file
 from ..errors import InputError
-from .bars import Bars
 from .identification import Identification, identify_law
 from .options import Specimen
 from .report import write_report
 from .runs_info import RunsInfo, SampleView, quality_rows, series_of
 from .study import Study, demo_study, read_study
-from .tasks import Prepare, Probe, Test, awaited_by, probes_of
+from .tasks import Prepare, Test, probes_of
 
 __all__ = ["run_study"]
-
-Task = Prepare | Test | Probe
 
 
 def run_study(
@@ -37,17 +34,18 @@ def run_study(
     directory: Path | str,
     *,
     jobs: int | None = None,
+    scheduler: str | None = None,
     show: bool = True,
     signs: str = "tension-positive",
 ) -> Identification:
     """Make the samples, test them, identify the law, write `report.html`, `report.json`, `law.py` and `runs/*.h5` into `directory`.
 
-    `study_file` None takes the study that fenchel carries; `jobs` None takes all cores; `signs` is for the axes of
+    `study_file` None takes the study that fenchel carries; `jobs` None takes all cores, `scheduler` is the address of a dask
+    scheduler to run on instead; `signs` is for the axes of
     the figures. Raises `InputError` for a bad study, `ConvergenceError` when a step or a fit does not converge, `StorageError` when a
     file cannot be written; finished runs stay and are taken up by the next call.
     """
     directory = Path(directory)
-    jobs = os.cpu_count() or 1 if jobs is None else jobs
     if study_file is None:
         study, text = demo_study()
     else:
@@ -65,18 +63,17 @@ def run_study(
     tests = [Test(study, seed, p, linked, folder) for seed in seeds for p in study.pressures for linked in kinds]
     probes = probes_of(study, folder) if study.solve.stiffness_probe else []
     folder.mkdir(parents=True, exist_ok=True)
-    with Bars([*prepare, *tests, *probes], folder, show=show) as bars:
-        _run(prepare, jobs, bars)
-        replace_file(directory / "study.toml", text)  # only now: runs of another study have refused by then
-        clock["preparation"] = time.perf_counter()
-        results = _run([*tests, *probes], jobs, bars)
-        clock["tests"] = time.perf_counter()
-    records: list[TriaxialRecord] = results[: len(tests)]
+    results = run_campaign(
+        [*prepare, *tests, *probes], folder, jobs=jobs, scheduler=scheduler, show=show, label="whole study"
+    )
+    replace_file(directory / "study.toml", text)  # only now: runs of another study have refused by then
+    clock["runs"] = time.perf_counter()
+    records: list[TriaxialRecord] = [results[test.name] for test in tests]
     if show:
         print("fitting the law, then writing the report", file=sys.stderr, flush=True)
     identification = identify_law(_specimens(tests, records), study.options())
     clock["identification"] = time.perf_counter()
-    info = _runs_info(study, prepare[0], tests, records, results[len(tests) :], clock)
+    info = _runs_info(study, prepare[0], tests, records, [results[probe.name] for probe in probes], clock)
     write_report(identification, info, directory, signs=signs)
     return identification
 
@@ -114,24 +111,6 @@ def _warm_up(study: Study) -> None:
         pair, law, Solver(keep_unconverged=True), pressure=1.0, density=2600.0, strain_path=(0.0, -1e-3)
     )
     test.advance()
-
-
-def _run(tasks: Sequence[Task], jobs: int, bars: Bars) -> list[Any]:
-    """Run tasks on `jobs` processes, in order of cost, and return their results in the order given."""
-    from joblib import Parallel, delayed
-
-    order = sorted(range(len(tasks)), key=lambda k: -tasks[k].cost)
-    out: list[Any] = [None] * len(tasks)
-    calls = (delayed(_call)(k, tasks[k], os.getpid()) for k in order)
-    for k, result in Parallel(n_jobs=jobs, return_as="generator_unordered", batch_size=1, pre_dispatch=jobs)(calls):
-        out[k] = result
-        bars.finished(tasks[k])
-    return out
-
-
-def _call(index: int, task: Callable[[], Any], caller: int) -> tuple[int, Any]:
-    awaited_by(caller)
-    return index, task()
 
 
 def _specimens(tests: Sequence[Test], records: Sequence[TriaxialRecord]) -> list[Specimen]:

@@ -1,25 +1,26 @@
 """The runs of a study as independent tasks: one per seed that prepares, one per test, one per stiffness probe.
 
 A task is a plain value that can be pickled to another process; its run file is its result and its checkpoint, so that a study that was
-stopped goes on where it was. Progress goes to a small file beside the run files, which whoever waits may read.
+stopped goes on where it was.
 """
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
 import msgspec
 import numpy as np
 
+from ..campaign import progress_file, report_progress
 from ..dem.bodies import Assembly
 from ..dem.preparation import make_sample, material_of, preparation, pressure_change
 from ..dem.record import TriaxialRecord
-from ..dem.run import Progress, Stage, finished_test, record_of, run_stages, triaxial_stage
+from ..dem.run import Stage, finished_test, record_of, run_stages, triaxial_stage
 from ..dem.stepping import Drive, Material, Simulation, Solver
 from ..dem.storage import load_run
 from ..dem.triaxial import TriaxialTest, inertial_time
@@ -28,33 +29,7 @@ from .curves import curves
 from .elastic import elastic_moduli
 from .study import Study
 
-__all__ = ["Prepare", "Probe", "Test", "awaited_by", "probes_of", "progress_file", "read_progress"]
-
-
-def _report(place: Path, progress: Progress) -> None:
-    """Leave the present progress in a file, whole or not at all; whoever waits for it gone, stop: the checkpoint stays."""
-    if _awaited and os.getppid() not in _awaited:
-        os._exit(1)
-    part = place.with_suffix(".part")
-    part.write_bytes(msgspec.json.encode(progress))
-    os.replace(part, place)
-
-
-_awaited: set[int] = set()
-
-
-def awaited_by(process: int) -> None:
-    """Tie the work of this process to another one: when that is gone, a task stops at its next report."""
-    if process != os.getpid():
-        _awaited.add(process)
-
-
-def read_progress(place: Path) -> Progress | None:
-    """The progress left by a task, if any."""
-    try:
-        return msgspec.json.decode(place.read_bytes(), type=Progress)
-    except (OSError, msgspec.DecodeError):
-        return None
+__all__ = ["Prepare", "Probe", "Test", "probes_of"]
 
 
 def _settings(study: Study, **more: Any) -> dict[str, Any]:
@@ -65,6 +40,19 @@ def _settings(study: Study, **more: Any) -> dict[str, Any]:
     return kept | more
 
 
+def _weight(study: Study) -> float:
+    """Work of a sample against one of a thousand grains."""
+    return study.grains.count / 1000.0
+
+
+def _told(label: str) -> str:
+    return f"{label}, " if label else ""
+
+
+def _stem(label: str) -> str:
+    return f"{label.replace(' ', '_')}_" if label else ""
+
+
 @dataclass(frozen=True)
 class Prepare:
     """Sample of one seed at rest at every pressure, one state file each."""
@@ -72,20 +60,26 @@ class Prepare:
     study: Study
     seed: int
     folder: Path
+    label: str = ""  # tells the samples of several studies in one folder apart
 
     @property
     def name(self) -> str:
         """Of the task, and of its progress file."""
-        return f"seed {self.seed}: preparation"
+        return f"{_told(self.label)}seed {self.seed}: preparation"
 
     @property
     def cost(self) -> float:
         """Rough share of the whole work."""
-        return 2.0 + 0.3 * (len(self.study.pressures) - 1)
+        return (2.0 + 0.3 * (len(self.study.pressures) - 1)) * _weight(self.study)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """Nothing."""
+        return ()
 
     def state_file(self, pressure: float) -> Path:
         """Where the state at a pressure is."""
-        return self.folder / f"seed{self.seed}_{pressure / 1e3:g}kPa_state.h5"
+        return self.folder / f"{_stem(self.label)}seed{self.seed}_{pressure / 1e3:g}kPa_state.h5"
 
     def __call__(self) -> None:
         """Walk through the pressures in rising order; each starts from the state before."""
@@ -115,7 +109,7 @@ class Prepare:
                 self.state_file(pressure),
                 _settings(study, seed=self.seed, pressures=levels[: k + 1]) | {"kind": "state"},
                 _state_content,
-                progress=lambda p, k=k: _report(
+                progress=lambda p, k=k: report_progress(
                     progress_file(self.folder, self.name), replace(p, fraction=(k + p.fraction) / len(levels))
                 ),
             )
@@ -132,11 +126,6 @@ def _load_state(path: Path) -> Assembly:
     return Assembly.from_arrays(content["assembly"])
 
 
-def progress_file(folder: Path, name: str) -> Path:
-    """Where a task of that name leaves its progress."""
-    return folder / f".progress-{name.replace(' ', '_').replace(':', '')}"
-
-
 @dataclass(frozen=True)
 class Test:
     """One triaxial test of one sample at one pressure, with or without links."""
@@ -146,22 +135,30 @@ class Test:
     pressure: float
     linked: bool
     folder: Path
+    label: str = ""
 
     @property
     def name(self) -> str:
         """Of the task, and of its progress file."""
-        return f"seed {self.seed}: {self.pressure / 1e3:g} kPa, {'links on' if self.linked else 'control'}"
+        return f"{_told(self.label)}seed {self.seed}: {self.pressure / 1e3:g} kPa, {'links on' if self.linked else 'control'}"
 
     @property
     def cost(self) -> float:
         """Rough share of the whole work."""
-        return 1.2 if self.linked else 1.0
+        path = self.study.triaxial.strain_path
+        walked = sum(abs(b - a) for a, b in pairwise(path)) / 0.042
+        return (1.2 if self.linked else 1.0) * walked * _weight(self.study)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The sample."""
+        return (Prepare(self.study, self.seed, self.folder, self.label).name,)
 
     @property
     def run_file(self) -> Path:
         """Where the record is."""
         kind = "linked" if self.linked else "unlinked"
-        return self.folder / f"seed{self.seed}_{self.pressure / 1e3:g}kPa_{kind}.h5"
+        return self.folder / f"{_stem(self.label)}seed{self.seed}_{self.pressure / 1e3:g}kPa_{kind}.h5"
 
     def __call__(self) -> TriaxialRecord:
         """Run or go on with the test; returns its record."""
@@ -187,11 +184,11 @@ class Test:
         )
         content = run_stages(
             [test],
-            partial(_load_state, Prepare(study, self.seed, self.folder).state_file(self.pressure)),
+            partial(_load_state, Prepare(study, self.seed, self.folder, self.label).state_file(self.pressure)),
             self.run_file,
             settings,
             partial(finished_test, seed=self.seed),
-            progress=partial(_report, progress_file(self.folder, self.name)),
+            progress=partial(report_progress, progress_file(self.folder, self.name)),
         )
         return record_of(content, settings)
 
@@ -217,7 +214,12 @@ class Probe:
     @property
     def cost(self) -> float:
         """Rough share of the whole work."""
-        return 0.3
+        return 0.3 * _weight(self.study)
+
+    @property
+    def needs(self) -> tuple[str, ...]:
+        """The sample."""
+        return (Prepare(self.study, self.seed, self.folder).name,)
 
     def __call__(self) -> dict[str, Any]:
         """A row of the table: settings, secant moduli at 0.02 and 0.05 %, residuals reached."""

@@ -1,4 +1,4 @@
-"""Progress of the tasks of a study: bars with step, strain, residual and time left, read from the files the tasks leave."""
+"""Progress of the tasks of a campaign: bars with step, strain, residual and time left, read from the files the tasks leave."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Protocol
 
-from .tasks import progress_file, read_progress
+from .task import progress_file, read_progress
 
 __all__ = ["Bars"]
 
@@ -25,11 +25,14 @@ class _Named(Protocol):
 class Bars:
     """A context in which finished work and the tasks at work are shown; on a terminal as bars, elsewhere as a line now and then."""
 
-    def __init__(self, tasks: Sequence[_Named], folder: Path, *, show: bool = True, pace: float = 15.0) -> None:
+    def __init__(
+        self, tasks: Sequence[_Named], folder: Path, *, show: bool = True, pace: float = 15.0, label: str = "all"
+    ) -> None:
         self.tasks = list(tasks)
         self.folder = folder
         self.show = show
         self.pace = pace
+        self.label = label
         self.done: set[str] = set()
         self.started = time.monotonic()
         self._stop = threading.Event()
@@ -97,7 +100,7 @@ class Bars:
             share, busy = self._state()
             table = Table.grid(padding=(0, 1))
             table.add_row(
-                "whole study",
+                self.label,
                 ProgressBar(total=1.0, completed=share, width=30),
                 f"{100 * share:.0f} %, {self._left(share)} left",
             )
