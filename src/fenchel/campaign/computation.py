@@ -27,6 +27,7 @@ class Computation:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     cost: float = 1.0
+    in_folder: bool = False  # the function reads what its needs left: it is given `folder=`, on which the result does not depend
 
     @property
     def run_file(self) -> Path:
@@ -44,6 +45,7 @@ class Computation:
             if before != settings:
                 raise InputError(f"{self.run_file}: was made with other settings; choose another place, or remove it")
             return content
-        result = self.function(**self.arguments)
+        place = {"folder": self.folder} if self.in_folder else {}
+        result = self.function(**self.arguments, **place)
         save_run(self.run_file, result, settings)
         return load_run(self.run_file)[0]  # the same types, whether computed now or before

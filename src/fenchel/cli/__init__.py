@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from . import compare, contact, dem, doctor, drive, identify, laws
+from . import compare, contact, dem, doctor, drive, identify, laws, reproduce
 from .faults import one_line
 
 __all__ = ["app", "main"]
@@ -44,7 +44,7 @@ def _face(
     """
 
 
-for _group in (laws, drive, compare, dem, contact, identify, doctor):
+for _group in (laws, drive, compare, dem, contact, identify, reproduce, doctor):
     _group.register(app)
 
 

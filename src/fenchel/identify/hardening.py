@@ -31,7 +31,7 @@ from .parameters import LawParameters
 from .replay import Simulate
 from .yielding import YieldFit, effective_hardening
 
-__all__ = ["HardeningFit", "Stage", "fit_hardening", "sensitivity"]
+__all__ = ["HardeningFit", "Stage", "fit_hardening", "misfit_of", "sensitivity"]
 
 Array = NDArray[np.float64]
 MAX_SLOPE = 1.6  # t above this leaves almost no yield in triaxial compression (none at √3)
@@ -108,6 +108,11 @@ class _Problem:
     def misfit(self, parameters: LawParameters) -> float:
         """rms over the tests of their rms/max|q|."""
         return float(np.sqrt(np.sum(self.residual(parameters) ** 2) / len(self.tests)))
+
+
+def misfit_of(tests: Sequence[Curves], parameters: LawParameters, simulate: Simulate) -> float:
+    """rms of q_law − q over the tests, each relative to its largest |q|."""
+    return _Problem(tests, simulate).misfit(parameters)
 
 
 def sensitivity(

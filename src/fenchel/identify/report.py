@@ -7,7 +7,6 @@ which a mechanician looks at them; then the quality of the runs. Nothing is fetc
 from __future__ import annotations
 
 import json
-from base64 import b64encode
 from collections.abc import Callable
 from dataclasses import dataclass
 from html import escape
@@ -16,6 +15,7 @@ from typing import Any
 
 from ..errors import StorageError
 from .figure_style import Signs, picture
+from .html import figure_html, page_html, table_html
 from .identification import Identification
 from .jsonable import jsonable
 from .law_file import write_law
@@ -77,37 +77,12 @@ def figures(found: Identification, info: RunsInfo, signs: Signs) -> list[_Figure
     return out
 
 
-_CSS = """
-:root{color-scheme:light}
-body{margin:0 auto;max-width:46rem;padding:1rem;font:16px/1.5 Georgia,"Times New Roman",serif;color:#222;background:#fff}
-h1{font-size:1.5rem;line-height:1.2;margin:.5rem 0}h2{font-size:1.1rem;margin:2rem 0 .5rem}
-ul.findings{padding-left:1.1rem}ul.findings li{margin:.3rem 0}ul.findings li.first{font-weight:bold}
-figure{margin:1.2rem 0}figure img{width:100%;height:auto}figcaption,caption{font-size:.9rem;color:#555;text-align:left}
-.scroll{overflow-x:auto;margin:1rem 0}
-table{border-collapse:collapse;font:13px/1.4 system-ui,sans-serif;font-variant-numeric:tabular-nums}
-th,td{padding:.2rem .7rem .2rem 0;text-align:left;vertical-align:top;border-bottom:1px solid #eee}
-th{font-weight:600;color:#555}td:not(:first-child){white-space:nowrap}
-summary{cursor:pointer;font-size:.9rem;color:#555}footer{margin:2rem 0;font-size:.85rem;color:#777}
-code{font-size:.85em}
-"""
-
-
 def _table(table: Table) -> str:
-    head = "".join(f"<th>{escape(h)}</th>" for h in table.head)
-    body = "".join("<tr>" + "".join(f"<td>{escape(cell)}</td>" for cell in row) + "</tr>" for row in table.rows)
-    caption = "" if table.folded else f"<caption>{escape(table.caption)}</caption>"
-    inside = f"{caption}<thead><tr>{head}</tr></thead><tbody>{body}</tbody>"
-    html = f'<div class="scroll"><table id="{table.key}">{inside}</table></div>'
-    return f"<details><summary>{escape(table.caption)}</summary>{html}</details>" if table.folded else html
+    return table_html(table.key, table.caption, table.head, table.rows, folded=table.folded)
 
 
 def _image(figure: _Figure) -> str:
-    data = b64encode(picture(figure.draw(), figure.kind)).decode()
-    mime = "image/svg+xml" if figure.kind == "svg" else "image/png"
-    return (
-        f'<figure id="figure-{figure.key}"><img alt="{escape(figure.caption)}" src="data:{mime};base64,{data}">'
-        f"<figcaption>{escape(figure.caption)}</figcaption></figure>"
-    )
+    return figure_html(figure.key, figure.caption, picture(figure.draw(), figure.kind), figure.kind)
 
 
 def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
@@ -145,11 +120,7 @@ def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
         f"<h2>Run files</h2><ul>{files}</ul>" if files else "",
         f"<footer>Identification {found.seconds:.1f} s; the same numbers in <code>report.json</code>.</footer>",
     ]
-    return (
-        '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-        '<meta name="viewport" content="width=device-width,initial-scale=1">'
-        f"<title>{escape(info.title)}</title><style>{_CSS}</style></head><body>{''.join(parts)}</body></html>\n"
-    )
+    return page_html(info.title, "".join(parts))
 
 
 def write_report(

@@ -20,14 +20,15 @@ from .deposit import Deposit
 from .sizes import Size
 
 __all__ = [
-    "BASE", "BEADS", "KINDS", "PRESSURE", "RADIUS", "RIGID", "STIFF", "VARIED", "Setting", "bead_label", "beads_study", "deposits",
-    "stiffness_label", "stiffness_runs", "study_of", "triaxial", "varied",
+    "BASE", "BEADS", "FREE", "KINDS", "PRESSURE", "RADIUS", "RIGID", "STIFF", "TAUT", "VARIED", "Setting", "bead_label", "beads_study", "deposits",
+    "stiffness_label", "stiffness_runs", "study_of", "taut_tests", "triaxial", "varied",
 ]  # fmt: skip
 
 RADIUS = 1.07e-3  # m, mean of the grains
 PRESSURE = 5e4  # Pa
 KINDS = ("linked", "unlinked", "sand")
 BASE = "block"
+TAUT = "block taut"  # wires that pull from the preparation on
 RIGID = "rigid wire"
 
 
@@ -53,6 +54,7 @@ class Setting:
     seeds: tuple[int, ...] = (1,)
 
 
+FREE = Setting()
 STIFF = Setting(beads=40, per_grain=2.0, state="prestressed", path=(0.0, -0.005), frame_strain=5e-5)
 BEADS = Setting(beads=40, per_grain=2.0, state="prestressed", path=(0.0, -0.03), frame_strain=2e-4)
 
@@ -117,6 +119,11 @@ def triaxial(
         tasks.append(Prepare(study, seed, folder, label))
         tasks += [Test(study, seed, p, on, folder, label) for p in study.pressures for on in linked]
     return tasks
+
+
+def taut_tests(size: Size, folder: Path) -> list[Any]:
+    """The triaxial tests of the blocks with wires that pull from the preparation on."""
+    return triaxial(size.grains, size.seeds, folder, label=TAUT, setting=Setting(state="prestressed"))
 
 
 def varied(size: Size, folder: Path) -> list[Task]:
