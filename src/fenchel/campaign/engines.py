@@ -151,7 +151,8 @@ class _ClusterEngine:
     def wait(self, futures: Iterable[Any]) -> list[Any]:
         from distributed import wait
 
-        return list(wait(list(futures), return_when="FIRST_COMPLETED").done)
+        with self._client.as_current():
+            return list(wait(list(futures), return_when="FIRST_COMPLETED").done)
 
     def result(self, future: Any) -> Any:
         from concurrent.futures import CancelledError

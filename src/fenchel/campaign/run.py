@@ -102,8 +102,8 @@ class _Loop:
         """Keep a result; a failure is also that of all that needed it."""
         self.results[name] = result
         self.finished(self.table[name])
-        for other in list(self.waiting):
-            if name not in self.waiting[other]:
+        for other in [other for other, needs in self.waiting.items() if name in needs]:
+            if other not in self.waiting:  # gone with a task that it needed as well
                 continue
             if isinstance(result, FenchelError):
                 del self.waiting[other]

@@ -92,7 +92,7 @@ def box_view(network: Network) -> Any:
     half = 1e3 * network.half
     space.set(xlim=(-half[0], half[0]), ylim=(-half[1], half[1]), zlim=(-half[2], half[2]))
     space.set(xlabel="x [mm]", ylabel="y [mm]", zlabel="z [mm]")
-    space.set_box_aspect(half, zoom=0.85)
+    space.set_box_aspect(tuple(half), zoom=0.85)
     space.tick_params(labelsize=7)
     side = axes[0, 1]
     shade = _wires(side, network, across=(0, 2))

@@ -88,14 +88,7 @@ def bead_figure(found: Mapping[float, Sequence[Any]]) -> Any:
             linewidth=0.9,
         )
     mismatch.axhline(noise, color=FAINT, linestyle="--", linewidth=0.9)
-    mismatch.annotate(
-        "two halves of the grains",
-        (0.97, noise),
-        xycoords=("axes fraction", "data"),
-        ha="right",
-        va="bottom",
-        fontsize=7,
-    )
+    mismatch.legend(["two halves of the grains"], fontsize=7, loc="upper right")
     mismatch.set(ylabel=r"$\|\varepsilon_s-\varepsilon_w\|/\|\varepsilon_s\|$", ylim=(0.0, None))
     slip.set(ylabel="slip [mean grain radii]", ylim=(0.0, None))
     share.set(ylabel="sliding bead contacts [%]", ylim=(0.0, None))
