@@ -241,9 +241,10 @@ def _threshold(s: _State) -> Verdict:
     return Verdict(
         claim=52,
         outcome=PASS if every else FAIL if not crossing else UNDECIDED,
-        sentence=f"The mismatch exceeds that of the thickest beads by 0.1 below a bead radius of {found.text('.2f')} mean grain "
-        f"radii; a bead "
-        "passes the throat between three touching grains at 0.155.",
+        sentence=f"The mismatch exceeds that of the thickest beads by 0.1 below a bead radius of {found.text('.2f')} mean grain radii; a bead "
+        "passes the throat between three touching grains at 0.155."
+        if crossing
+        else "No bead radius of the sweep parts the phases by 0.1 more than the thickest beads do.",
         value=found.value, low=found.low, high=found.high, numbers={"by_seed": crossing, "throat": 2.0 / np.sqrt(3.0) - 1.0},
         settings=s.settings, needed="" if every or not crossing else "about 5 seeds",
     )  # fmt: skip

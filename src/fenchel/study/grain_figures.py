@@ -87,8 +87,8 @@ def bead_figure(found: Mapping[float, Sequence[Any]]) -> Any:
             color="#1b6ca8",
             linewidth=0.9,
         )
-    mismatch.axhline(noise, color=FAINT, linestyle="--", linewidth=0.9)
-    mismatch.legend(["two halves of the grains"], fontsize=7, loc="upper right")
+    mismatch.axhline(noise, color=FAINT, linestyle="--", linewidth=0.9, label="two halves of the grains")
+    mismatch.legend(fontsize=7, loc="upper right")
     mismatch.set(ylabel=r"$\|\varepsilon_s-\varepsilon_w\|/\|\varepsilon_s\|$", ylim=(0.0, None))
     slip.set(ylabel="slip [mean grain radii]", ylim=(0.0, None))
     share.set(ylabel="sliding bead contacts [%]", ylim=(0.0, None))

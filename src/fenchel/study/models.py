@@ -17,11 +17,21 @@ from ..potentials.derivative import partial
 from ..potentials.evaluate import evaluate
 from ..potentials.library import reinforced_sand, sand, texsol
 
-__all__ = ["MODELS", "equivalent_stress", "model_values", "wire_stress"]
+__all__ = ["MODELS", "SETS", "equivalent_stress", "model_values", "wire_stress"]
 
 Array = NDArray[np.float64]
 
 MODELS: dict[str, Law] = {"sand": sand, "reinforced": reinforced_sand, "texsol": texsol}
+
+_COMMON = dict(nu_s=0.2, nu_w=0.2, C_0=2842.0)
+_TABLE_3 = _COMMON | dict(E_s=12.167e6, E_w=0.332e6, theta_f=0.079, H_k=0.944e6, H_i=0.472e6)
+SETS: dict[str, dict[str, float]] = {
+    "table 3": _TABLE_3,  # means over the five pressures of the study
+    "frictional": _TABLE_3 | dict(theta_f=0.3),  # friction nearer to that of a sand that fails
+    "low cohesion": _TABLE_3 | dict(theta_f=0.3, C_0=500.0),  # flows early, and dilates
+    "stiff": _TABLE_3 | dict(E_s=12e6, E_w=6e6),
+    "demo_stiff": _COMMON | dict(E_s=12e6, E_w=6e6, theta_f=0.3, H_k=2e6, H_i=0.05e6),
+}  # Pa, rad
 
 
 def model_values(law: Law, values: Mapping[str, float]) -> dict[str, float]:
