@@ -55,7 +55,8 @@ def test_the_figures_are_drawn(results: dict[str, Any], tmp_path: Path) -> None:
 
 def test_the_same_numbers_again() -> None:
     assert contact_operator.conservation(2) == contact_operator.conservation(2)
-    assert contact_onestep.friction(1, turns=5) == contact_onestep.friction(1, turns=5)
+    first, second = (wire_graphs.rigid_limit(2, [1e3, 1e4]) for _ in range(2))
+    assert all(np.array_equal(first[name], second[name]) for name in first)
 
 
 def test_what_was_not_asked_for_is_not_run(tmp_path: Path) -> None:

@@ -120,13 +120,16 @@ def test_slopes_of_wires_that_resist_both_ways_fail(cyclic, monkeypatch):
     assert verdict.numbers["ratios"]["stiff"]["texsol"] == pytest.approx(1.0)
 
 
-def test_an_element_that_is_no_material_point_fails(cyclic, monkeypatch):
+def test_an_element_of_another_material_fails(cyclic, monkeypatch):
     folder, results = cyclic
-    real = cyclic_runs.model_values
-    monkeypatch.setattr(cyclic_runs, "model_values", lambda law, v: real(law, v))
-    checks = dict(results["D: steps and element"])
-    checks["element"] = dict.fromkeys(MODELS, 1e-3)
-    assert judge(CYCLIC, folder, results | {"D: steps and element": checks})[17].outcome == "fail"
+    real = cyclic_runs.run_model
+    monkeypatch.setattr(
+        cyclic_runs, "run_model", lambda model, values, test: real(model, {**values, "C_0": 2900.0}, test)
+    )
+    checks = results["D: steps and element"]
+    element = {m: cyclic_runs._one_element(m, cyclic_runs.SETS["demo_stiff"]) for m in MODELS}
+    verdict = judge(CYCLIC, folder, results | {"D: steps and element": {**checks, "element": element}})[17]
+    assert verdict.outcome == "fail"
 
 
 def test_sand_alone_in_all_three_places_fails(cyclic):

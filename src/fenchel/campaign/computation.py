@@ -27,7 +27,9 @@ class Computation:
     arguments: Mapping[str, Any] = field(default_factory=dict)
     needs: tuple[str, ...] = ()
     cost: float = 1.0
-    in_folder: bool = False  # the function reads what its needs left: it is given `folder=`, on which the result does not depend
+    in_folder: bool = (
+        False  # the function reads what its needs left: it is given `folder=`, on which the result does not depend
+    )
 
     @property
     def run_file(self) -> Path:

@@ -152,7 +152,8 @@ class _ClusterEngine:
         from distributed import wait
 
         with self._client.as_current():
-            return list(wait(list(futures), return_when="FIRST_COMPLETED").done)
+            over: Any = wait(list(futures), return_when="FIRST_COMPLETED")
+        return list(over.done)
 
     def result(self, future: Any) -> Any:
         from concurrent.futures import CancelledError

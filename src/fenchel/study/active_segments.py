@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -115,7 +116,7 @@ def definition_holds(network: Network) -> dict[str, bool]:
     mean = active_length(network).mean_tension
     beyond = float(np.abs(network.tension).max()) / mean * (1.0 + 1e-9) if mean > 0.0 else 1.0
     return {
-        "falls with m": all(b <= a for a, b in zip(lengths[:-1], lengths[1:], strict=True)),
+        "falls with m": all(b <= a for a, b in pairwise(lengths)),
         "longest wire at m = 0": bool(abs(lengths[0] - longest) <= 1e-12 * longest),
         "independent of scale": [active_length(doubled, m=float(m)).length for m in MULTIPLES] == lengths,
         "zero above the largest tension": active_length(network, m=beyond).length == 0.0,

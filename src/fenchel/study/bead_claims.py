@@ -185,7 +185,8 @@ def _sliding(s: _State) -> Verdict:
         + (", it comes in bursts." if sudden else ": the wires slide steadily, not suddenly." if grows else "."),
         value=slip,
         numbers={
-            "rank_slip": slip, "rank_sliding": sliding, **{f"slip_{r:g}": m.numbers() for r, m in zip(s.ratios, s.means("slip"), strict=True)},
+            "rank_slip": slip, "rank_sliding": sliding,
+            **{f"slip_{r:g}": m.numbers() for r, m in zip(s.ratios, s.means("slip"), strict=True)},
             **{f"sliding_{r:g}": m.numbers() for r, m in zip(s.ratios, s.means("sliding"), strict=True)},
             **{f"burst_{r:g}": m.numbers() for r, m in zip(s.ratios, burst, strict=True)},
         },
@@ -241,7 +242,8 @@ def _threshold(s: _State) -> Verdict:
     return Verdict(
         claim=52,
         outcome=PASS if every else FAIL if not crossing else UNDECIDED,
-        sentence=f"The mismatch exceeds that of the thickest beads by 0.1 below a bead radius of {found.text('.2f')} mean grain radii; a bead "
+        sentence=f"The mismatch exceeds that of the thickest beads by 0.1 below a bead radius of {found.text('.2f')} mean grain "
+        f"radii; a bead "
         "passes the throat between three touching grains at 0.155."
         if crossing
         else "No bead radius of the sweep parts the phases by 0.1 more than the thickest beads do.",

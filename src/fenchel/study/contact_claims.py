@@ -45,7 +45,7 @@ CLAIMS = (
     ),
     Claim(
         29, "T", "Without friction a step is a linear complementarity problem.",
-        "Sweeps, pivots and a quadratic program give the same velocities to 1e-8, complementarity checked.",
+        "Sweeps that end, pivots and quadratic programs give the same velocities to 1e-8, complementarity checked.",
     ),
     Claim(
         30, "T", "With friction the impulses obey the non-smooth law of sliding.",

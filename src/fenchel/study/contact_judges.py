@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .claim import Verdict, decided
+from .contact_onestep import COMPARED
 from .contact_scenes import fitted_exponent
 from .wire_graphs import LAWS
 
@@ -50,24 +51,27 @@ def _operator(r: Results, settings: Settings) -> Verdict:
 
 def _complementarity(r: Results, settings: Settings) -> Verdict:
     found = r["F: complementarity"]
-    compared = ("program", "solver", "sweeps", "certificate", "pivots_certificate")
-    worst = max(f[name] for f in found.values() for name in compared)
-    slack = [f for name, f in found.items() if name != "rigid wires"]
-    taut = found["rigid wires"]
+    worst = max(f[name] for f in found.values() for name in COMPARED)
+    rows, problems, late = (sum(f[what] for f in found.values()) for what in ("rows", "problems", "unfinished"))
     numbers = {
-        f"{name}: {what}": f[what] for name, f in found.items() for what in (*compared, "rows", "longest", "unfinished")
+        f"{name}: {what}": f[what]
+        for name, f in found.items()
+        for what in (*COMPARED, "rows", "problems", "unfinished", "sweeps_of_unfinished", "longest")
     }
     sentence = (
-        f"On {sum(f['rows'] for f in found.values())} normal rows the velocities of sweeps, solver, Lemke's pivots and quadratic "
-        f"program differ by at most {worst:.0e} of the largest approach, after up to {max(f['longest'] for f in slack)} sweeps."
+        f"On {rows} normal rows of {problems} steps the velocities of sweeps, solver, Lemke's pivots and active sets differ by at most "
+        f"{worst:.0e} of the largest approach, optima and complementarity included."
     )
-    if taut["unfinished"]:
-        sentence += (
-            f" With rigid wires among rigid grains the sweeps did not end within {taut['longest']} in {taut['unfinished']} of "
-            f"{taut['problems']} problems (velocities off by {taut['sweeps_of_unfinished']:.0e}); pivots and solver agree there."
+    if late:
+        off = max(f["sweeps_of_unfinished"] for f in found.values())
+        among = ", ".join(
+            f"{f['unfinished']} of {f['problems']} with {name}" for name, f in found.items() if f["unfinished"]
         )
-    ended = all(f["unfinished"] == 0 for f in slack)
-    outcome = decided(bool(worst < 1e-8 and ended and min(f["closed"] for f in found.values()) > 0))
+        sentence += (
+            f" In {late} of them ({among}) the sweeps had not ended at the limit, velocities off by up to {off:.0e}."
+        )
+    used = all(f["closed"] > 0 and f["unfinished"] < f["problems"] for f in found.values())
+    outcome = decided(bool(worst < 1e-8 and used and found["compliant grains"]["unfinished"] == 0))
     return Verdict(claim=29, outcome=outcome, sentence=sentence, value=worst, numbers=numbers, settings=settings)
 
 
@@ -81,14 +85,16 @@ def _friction(r: Results, settings: Settings) -> Verdict:
             for q, label in enumerate(("median", "90 %", "99 %", "largest")):
                 numbers[f"{name} packing, tolerance {tolerance:g}, {label}"] = float(scale[name][k, q])
     used = min(f["arrived"], f["swept"], f["sliding"]) > 0
-    holds = used and error < 1e-8 and words < 1e-8 and program < 2e-6 and f["arrived_map"] < 1e-6
+    # cone programs are solved to gaps of 1e-11, energy distances are their square roots
+    holds = used and error < 1e-8 and words < 1e-7 and program < 1e-5 and f["arrived_map"] < 1e-5
     middle = len(scale["tolerances"]) // 2
+    elsewhere = f" or, in {f['elsewhere']}, of another one" if f["elsewhere"] else ""
     sentence = (
         f"{f['problems']} small problems: natural map {error:.0e}, energy distance from the cone program of the own slip "
         f"{program:.0e}. The sweeps ended in {f['swept']}; the fixed point from rest stood still in {f['arrived']}, within "
-        f"{f['arrived_apart']:.0e} of a solution known; {f['several']} have more than one solution. In a packing of "
-        f"{scale['contacts']} contacts a tolerance of {scale['tolerances'][middle]:.0e} leaves {scale['total_rigid'][middle]:.0e}, "
-        f"and {scale['rigid'][middle, 3]:.0e} of the mean impulse at the worst contact."
+        f"{f['arrived_apart']:.0e} of a solution known{elsewhere}. In {f['several']} sweeps and solver end at different solutions, each "
+        f"within these bounds. In a packing of {scale['contacts']} contacts a tolerance of {scale['tolerances'][middle]:.0e} leaves "
+        f"{scale['total_rigid'][middle]:.0e}, and {scale['rigid'][middle, 3]:.0e} of the mean impulse at the worst contact."
     )
     return Verdict(
         claim=30, outcome=decided(bool(holds)), sentence=sentence, value=error, numbers=numbers, settings=settings

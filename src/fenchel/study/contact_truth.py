@@ -2,7 +2,8 @@ r"""One-step contact problems solved a second time, by means that share nothing 
 
 * `lemke`: complementary pivoting for 0 ≤ x ⊥ W x + q ≥ 0; it ends at a solution for every positive semidefinite W for which there is one
   (Cottle, Pang and Stone 1992), followed by one exact solve on the set of rows that it found.
-* `quadratic_program`: the same problem as min ½ x·W x + q·x over x ≥ 0, an interior point method (clarabel) through cvxpy.
+* `LeastConstraint`: the same step as a quadratic program in the velocities, by active sets (scipy) and by an interior point (clarabel
+  through cvxpy).
 * `cone_fixed_point`: with s = ‖u_T‖ frozen a step with friction is a second-order cone program; s ← ‖u_T(s)‖ until it stands still
   (Acary, Cadoux, Lemaréchal and Malick 2011).
 * `natural_map`: r − P_K(r − ρ û) contact by contact, û = u + μ‖u_T‖ n, ρ = 1/W_NN (de Saxcé and Feng 1998); the projection by cases.
@@ -10,6 +11,7 @@ r"""One-step contact problems solved a second time, by means that share nothing 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,7 +19,7 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
 
-__all__ = ["ConeStep", "cone_fixed_point", "least_constraint", "lemke", "natural_map"]
+__all__ = ["ConeStep", "LeastConstraint", "cone_fixed_point", "lemke", "natural_map"]
 
 Array = NDArray[np.float64]
 
@@ -61,38 +63,55 @@ def _on_rows(matrix: Array, q: Array, active: NDArray[np.int64]) -> Array:
     return x
 
 
-# as far as the interior point goes: where rows depend on each other it stops short of 1e-12 and says "inaccurate"
-_TIGHT: dict[str, Any] = {f"tol_{name}": 1e-12 for name in ("gap_abs", "gap_rel", "feas")}
-_TIGHT |= {f"reduced_{name}": 1e-7 for name in _TIGHT}
+@dataclass(frozen=True)
+class LeastConstraint:
+    """Gauss: the velocities nearest to the free ones in kinetic energy among those with u = Hᵀ v + w ≥ 0, as min ½‖y‖² over G y ≥ g.
 
-
-def least_constraint(h: Array, inverse_mass: Array, free: Array, shift: Array) -> Array:
-    """Multipliers x (n,) of: the velocities nearest to the free ones in kinetic energy with Hᵀ v + w ≥ 0 (Gauss); H (d, n), w (n,).
-
-    Raises `ConvergenceError` when the interior point method gives none.
+    y = M^(1/2) (v − v_free)/size, rows of unit length; H (d, n), inverse mass and free velocity (d,), w (n,).
     """
-    import cvxpy as cp
 
-    q = h.T @ free + shift
-    rows = h.T * np.sqrt(inverse_mass)
-    length, size = np.linalg.norm(rows, axis=1), float(np.max(np.abs(q)))
-    # y = M^(1/2) (v − v_free) / size
-    y = cp.Variable(len(free))
-    bounds = [(rows / length[:, None]) @ y + q / (size * length) >= 0]
-    program = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(y)), bounds)
-    program.solve(solver=cp.CLARABEL, **_TIGHT)
-    if bounds[0].dual_value is None:
+    g: Array  # (n,)
+    matrix: Array  # G (n, d)
+    length: Array  # (n,) of the rows before
+    size: float
+
+    @classmethod
+    def of(cls, h: Array, inverse_mass: Array, free: Array, shift: Array) -> LeastConstraint:
+        """The data, scaled to order one."""
+        rows = h.T * np.sqrt(inverse_mass)
+        length = np.linalg.norm(rows, axis=1)
+        approach = -(h.T @ free + shift) / length
+        size = float(np.linalg.norm(np.maximum(approach, 0.0)))
+        return cls(approach / size, rows / length[:, None], length, size)
+
+    def velocities(self) -> Array:
+        """u (n,), exactly, by the active sets of Lawson and Hanson (1974, chapter 23) through scipy."""
+        from scipy.optimize import nnls
+
+        table = np.vstack([self.matrix.T, self.g])
+        last = np.zeros(len(table))
+        last[-1] = 1.0
+        x, _ = nnls(table, last, maxiter=100 * table.shape[1])
+        r = table @ x - last
+        return self.size * self.length * (self.matrix @ (-r[:-1] / r[-1]) - self.g)
+
+    def optimum(self) -> float:
+        """½‖M^(1/2) (v − v_free)‖² at the minimum, by an interior point (clarabel) through cvxpy, to 1e-9 or better.
+
+        Raises `ConvergenceError` when that is not reached.
+        """
+        import cvxpy as cp
+
+        y = cp.Variable(self.matrix.shape[1])
+        program = cp.Problem(cp.Minimize(0.5 * cp.sum_squares(y)), [self.matrix @ y >= self.g])
+        names = [f"{reduced}tol_{name}" for reduced in ("", "reduced_") for name in ("gap_abs", "gap_rel", "feas")]
+        for tolerance in (1e-12, 1e-11, 1e-10, 1e-9):  # dependent rows may put the tightest out of reach
+            try:
+                found: Any = program.solve(solver=cp.CLARABEL, **dict.fromkeys(names, tolerance))
+                return self.size**2 * float(found)
+            except cp.SolverError:
+                continue
         raise ConvergenceError(f"the quadratic program ended with status {program.status}")
-    # the interior point says which rows hold; the values are those of these rows, corrected until none changes side
-    matrix, x = rows @ rows.T, size / length * np.asarray(bounds[0].dual_value)
-    active = x * length**2 > matrix @ x + q
-    for _ in range(30):
-        x = _on_rows(matrix, q, np.flatnonzero(active))
-        u = matrix @ x + q
-        if min(x.min() / x.max(), u.min() / size) > -1e-13:
-            break
-        active = x * length**2 > u
-    return x
 
 
 class ConeStep:

@@ -46,6 +46,7 @@ Array = NDArray[np.float64]
 COSTS = ("axial", "strain", "stress", "gap")
 NAMES = ("t", "C_0", "H_k", "H_i")
 FREE = (*NAMES, "E_s")
+GAIN = 1e-6  # of the cost, at which a fit ends; one standard deviation of an unknown is 1/n of it, n the number of residuals
 STRAINS, STRESSES = np.zeros(6, dtype=bool), np.ones(6, dtype=bool)
 AXIAL = np.array([True, True, False, True, True, True])
 
@@ -277,7 +278,7 @@ def fit(
     empty = np.full(len(problem.names), np.nan)
     try:
         with np.errstate(invalid="ignore"):  # where the law is refused
-            y = bounded_least_squares(problem.at, problem.unknowns(begin), problem.upper)
+            y = bounded_least_squares(problem.at, problem.unknowns(begin), problem.upper, ftol=GAIN)
         counts = (problem.evaluations, problem.law_steps, problem.refused)
         y = np.where(y <= 1e-6, 0.0, y)
         law = problem.law(y)

@@ -64,7 +64,9 @@ def _loops(axes: Any, found: Mapping[str, Any]) -> list[Any]:
 @styled
 def sweep_figure(axes_of: Mapping[str, Array], sooner: Array) -> Any:
     """Rows: θ_f, within it E_w/E_s; columns: H_i, within it the stroke, within it H_k. Colour: loops sooner than sand."""
-    import matplotlib
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
 
     n = len(axes_of["ratio"])
     table = sooner.transpose(1, 0, 3, 4, 2).reshape(n * n, n * n * n)
@@ -73,8 +75,8 @@ def sweep_figure(axes_of: Mapping[str, Array], sooner: Array) -> Any:
     y = np.array([j + gap * (j // n) for j in range(n * n)])
     figure, axes = canvas(1, 1, height=max(2.4, 0.19 * (n * n) + 1.9))
     one = axes[0, 0]
-    norm = matplotlib.colors.Normalize(-4.0, 15.0)
-    shades = matplotlib.colormaps["Blues"]
+    norm = Normalize(-4.0, 15.0)
+    shades = colormaps["Blues"]
     size = min(15.0, 280.0 / (n**3 + gap * n * n)) ** 2
     at_x, at_y = (a.reshape(-1) for a in np.meshgrid(x, y))
     flat = table.reshape(-1)
@@ -85,7 +87,7 @@ def sweep_figure(axes_of: Mapping[str, Array], sooner: Array) -> Any:
         for chosen, edge in ((equal, "#b9b9b9"), (later, LATER))
     ]
     _ticks(one, axes_of, x, y, n)
-    scale = matplotlib.cm.ScalarMappable(matplotlib.colors.Normalize(1.0, 15.0), _upper(shades, norm))
+    scale = ScalarMappable(Normalize(1.0, 15.0), _upper(shades, norm))
     bar = figure.colorbar(scale, ax=one, label="loops sooner than sand", shrink=0.9, aspect=14)
     bar.set_ticks([1, 5, 10, 15], labels=["1", "5", "10", "≥ 15"])
     legend_below(figure, handles, ["equal", "later"], columns=2)
@@ -94,9 +96,9 @@ def sweep_figure(axes_of: Mapping[str, Array], sooner: Array) -> Any:
 
 def _upper(shades: Any, norm: Any) -> Any:
     """The part of a colour map from one loop on."""
-    import matplotlib
+    from matplotlib.colors import ListedColormap
 
-    return matplotlib.colors.ListedColormap(shades(norm(np.linspace(1.0, 15.0, 64))))
+    return ListedColormap(shades(norm(np.linspace(1.0, 15.0, 64))))
 
 
 def _value(name: str, x: float) -> str:

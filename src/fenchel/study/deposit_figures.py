@@ -23,14 +23,16 @@ SHADES = {"linked": "#1b6ca8", "unlinked": "#d1783c", "sand": "#6b6b2a"}
 def _wires(axes: Any, network: Network, *, across: tuple[int, ...], scale: float = 1e3) -> Any:
     """Slack wires thin and grey, active links thick and coloured by tension over the mean; returns what a colour bar needs."""
     import matplotlib
+    from matplotlib.cm import ScalarMappable
     from matplotlib.collections import LineCollection
+    from matplotlib.colors import Normalize
 
     mean = active_length(network).mean_tension
     ratio = network.tension / mean if mean > 0.0 else np.zeros(len(network.tension))
     ends = scale * network.x[network.link][:, :, list(across)]
     weak, strong = ratio < 3.0, ratio >= 3.0
     shades = matplotlib.colormaps["viridis"]
-    norm = matplotlib.colors.Normalize(3.0, max(4.0, float(np.quantile(ratio[strong], 0.98)) if strong.any() else 4.0))
+    norm = Normalize(3.0, max(4.0, float(np.quantile(ratio[strong], 0.98)) if strong.any() else 4.0))
     kind = LineCollection
     if len(across) == 3:
         from mpl_toolkits.mplot3d.art3d import Line3DCollection
@@ -39,7 +41,7 @@ def _wires(axes: Any, network: Network, *, across: tuple[int, ...], scale: float
     axes.add_collection(kind(list(ends[weak]), colors="#b9b9b9", linewidths=0.35))
     order = np.argsort(ratio[strong])
     axes.add_collection(kind(list(ends[strong][order]), colors=shades(norm(ratio[strong][order])), linewidths=1.8))
-    return matplotlib.cm.ScalarMappable(norm, shades)
+    return ScalarMappable(norm, shades)
 
 
 @styled

@@ -111,7 +111,7 @@ def _by_body(network: Network) -> Array:
 
 
 def _identities(s: _State) -> Verdict:
-    worst = dict.fromkeys(
+    worst: dict[str, float] = dict.fromkeys(
         ("whole box", "walls", "contacts in the sphere", "links in the sphere", "hull", "best fit", "cells"), 0.0
     )
     for seed, (network, record, pair) in enumerate(zip(s.networks, s.records, s.pairs, strict=True)):

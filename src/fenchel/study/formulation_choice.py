@@ -231,10 +231,11 @@ def verdict_sentence(found: Mapping[str, Any]) -> str:
         d = found["discrete"]
         what = "on the tests fitted" if d["left out"] == "nothing" else f"where a {d['left out']} was left out"
         missed = _listed(d["order"], lambda c: format(d[c]["q left out"], ".1%"))
+        every = _listed(d["order"], lambda c: format(d[c]["all costs"], ".2f"))
         friction = _listed(d["order"], lambda c: format(d[c]["values"]["t"], ".2f"))
         said += (
             f" For grains {TITLES[d['best']]} comes first: error of q {what} {missed}{_equals(d, d['left out'])}; tan θ_f found "
-            f"{friction}, by the yield points {d['t_yield']:.2f}; measured by all four costs {SHORT[d['best by all costs']]} is nearest."
+            f"{friction}, by the yield points {d['t_yield']:.2f}; misfits by all four costs over the least of each {every}."
         )
     return said
 
@@ -273,7 +274,7 @@ def table(found: Mapping[str, Any]) -> tuple[list[str], list[list[str]]]:
         add("failed", "planted", lambda n: f"{n['failed']} of {n['fits']}")
         add("best in", "planted", lambda n: f"{n['best in']} of {found['planted']['draws']}")
         add("flow added at 1 %", "planted", lambda n: f"{n['false flow']:+.2%}")
-        add("noise out over noise in", "planted", lambda n: f"{n['amplification']:.1f}")
+        add("noise out over noise in", "planted", lambda n: f"{n['amplification']:.1f}".replace("nan", "–"))
         add("misfit without hardening", "planted", lambda n: f"{n['without hardening']:.2g}")
     if "discrete" in found:
         add("grains: q left out", "discrete", lambda n: f"{n['q left out']:.1%}")

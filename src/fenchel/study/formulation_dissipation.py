@@ -77,7 +77,7 @@ class _Steps:
         """Σ A·Δα of a declaration of the energy."""
         return sum((dot(numbers.force(v, state), self.rates[v.name]) for v in self.law.internal), 0.0 * self.lost)
 
-    def differences(self, numbers: Numbers, state: Mapping[str, Array], rows: Array) -> Array:
+    def differences(self, numbers: Numbers, state: Mapping[str, Array], rows: Any) -> Array:
         """Slope of ψ* along the change of the internal variables, at fixed stress."""
         here, stress = {k: v[rows] for k, v in state.items()}, self.reversible[rows]
         change = {v.name: self.rates[v.name][rows] for v in self.law.internal}

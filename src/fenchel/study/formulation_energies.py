@@ -153,7 +153,7 @@ def _convolution(values: Any, stress: Array, plastic: Array) -> tuple[float, Arr
 
 
 def _shares(rng: np.random.Generator, n: int) -> dict[str, float]:
-    """ψ* of `texsol` as the least sum over shares, as a supremum, and by the rules; and the share of the sand against its own stress."""
+    """ψ* of `texsol` as the least sum over shares, as a supremum, and certified; and the share of the sand against its own stress."""
     entry = ENTRIES["texsol"]
     numbers, state = Numbers(entry.law, entry.values), random_states(entry, rng, n)
     stress, values = numbers.stress(state), entry.values

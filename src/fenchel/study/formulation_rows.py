@@ -216,7 +216,7 @@ def _of_law(rng: np.random.Generator, n: int) -> dict[str, float]:
     parameters = Numbers(s.law, s.values).values | {s.law.temperature: s.T}
     dual = {v: both.duals[s.law.forces[v]] for v in (*s.law.internal, s.law.temperature)}
     plastic = s.growth > 0
-    rows: Mapping[Any, Array] = {
+    rows: Mapping[Any, Any] = {
         **parameters, s.law.forces[s.law.internal[0]]: s.A, dual[s.law.internal[1]]: s.growth, dual[s.law.temperature]: s.flux,
     }  # fmt: skip
 

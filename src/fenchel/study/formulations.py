@@ -44,12 +44,14 @@ CHECKS = (
         name="B: Fenchel equality",
         function=fenchel_equality,
         arguments=lambda s: {"seed": 5, "count": s.samples, "programs": max(3, s.samples // 100)},
-        below={"equality": 1e-12, "below": 1e-12, "programs": 2e-6},
-        sentence="ψ + ψ* − σ:ε vanishes to {equality:.1e} of its terms for {energies} energies of the library and {kinked} with "
-        "kinks, {points} states each; certified programs agree to {programs:.1e}, and no other strain comes lower than "
-        "{below:.1e}.",
+        below={"equality": 1e-12, "below": 1e-12, "programs": 1e-6, "outside": 1e-9},
+        sentence="ψ + ψ* − σ:ε vanishes to {equality:.1e} of its terms for {energies} energies of the library and {kinked} with kinks, "
+        "{points} states each; certified programs agree to {programs:.1e}; at strains of other stresses it is nowhere below "
+        "−{below:.1e}.",
         headline="equality",
-        held=_ALL | {"energies with kinks": f"G = {MODULUS:g}, c = {KINK:g}", "wires alone": "supremum in extension, rule everywhere"},
+        held=_ALL | {
+            "energies with kinks": f"G = {MODULUS:g}, c = {KINK:g}", "wires alone": "rule everywhere, supremum and program in extension",
+        },
         cost=8.0,
     ),
     Check(

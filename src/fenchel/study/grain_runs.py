@@ -10,17 +10,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from ..campaign import Task
-from ..dem.scene import Grains, Sample, Wires
+from ..dem.scene import Grains, Name, Sample, Wires
 from ..identify.study import Identify, Study, StudySolve, StudyTriaxial
 from ..identify.tasks import Prepare, Test
 from .deposit import Deposit
 from .sizes import Size
 
 __all__ = [
-    "BASE", "BEADS", "FREE", "KINDS", "PRESSURE", "RADIUS", "RIGID", "STIFF", "TAUT", "VARIED", "Setting", "bead_label", "beads_study", "deposits",
+    "BASE", "BEADS", "FREE", "KINDS", "PRESSURE", "RADIUS", "RIGID", "STIFF", "TAUT", "VARIED", "Setting", "bead_label", "beads_study",
+    "deposits",
     "stiffness_label", "stiffness_runs", "study_of", "taut_tests", "triaxial", "varied",
 ]  # fmt: skip
 
@@ -39,9 +40,9 @@ class Setting:
     beads: int = 60
     per_grain: float = 1.0  # beads over grains
     bead_ratio: float = 0.4
-    law: str = "elastic_wire"
+    law: Name = "elastic_wire"
     stiffness: float = 100.0  # N
-    state: str = "stress_free"
+    state: Literal["stress_free", "prestressed"] = "stress_free"
     friction: float = 0.4
     path: tuple[float, ...] = (0.0, -0.01)
     tolerance: float = 1e-5

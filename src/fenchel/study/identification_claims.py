@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Mapping
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -40,7 +41,10 @@ CLAIMS = (
         "Monotone tests find one number only: condition above 1e6, below 10 with a reversal; planted values come back only there.",
     ),
     Claim(70, "Q", "Model updating converges for the hardening moduli.", "Planted H_k and H_i come back to 1 % with a reversal."),
-    Claim(71, "Q", "The identified law reproduces the discrete test.", "rms error of q below 15 % of its largest value on the fitted tests."),
+    Claim(
+        71, "Q", "The identified law reproduces the discrete test.",
+        "rms error of q below 15 % of its largest value on the fitted tests.",
+    ),
 )  # fmt: skip
 
 STUDY_TABLE = {  # Laniel, Alart and Pagano (c. 2008), Table 3
@@ -79,7 +83,8 @@ def settings_of(size: Size) -> dict[str, Any]:
     study = identify_study(size)
     assert study.wires is not None
     return {
-        "grains": size.identify_grains, "seeds": size.identify_seeds, "pressures [Pa]": list(size.pressures), "held out [Pa]": list(size.held_out),
+        "grains": size.identify_grains, "seeds": size.identify_seeds, "pressures [Pa]": list(size.pressures),
+        "held out [Pa]": list(size.held_out),
         "beads per grain": 2.0, "beads of a wire": study.wires.beads, "k [N]": study.wires.stiffness, "friction": study.grains.friction,
         "tolerance": study.solve.tolerance, "step / inertial time": study.solve.step, "wires": "free of tension at each pressure",
     }  # fmt: skip
@@ -110,7 +115,8 @@ def _poisson(size: Size, results: Mapping[str, Any]) -> Verdict:
         sentence=f"The common ν of our tests is {nu['value']:.3f}{_bracket(nu)}; the sand alone has {alone:.3f}, the wires alone "
         f"{own['nu_wire_alone']:.3f}: " + ("0.2 is in the interval." if inside else "0.2 is not in the interval.")
         + " The ratio of the contact stiffnesses, here 0.8, sets it.",
-        value=nu["value"], low=low, high=high, numbers={"sand_alone": alone, "wire_alone": own["nu_wire_alone"]}, settings=settings_of(size),
+        value=nu["value"], low=low, high=high,
+        numbers={"sand_alone": alone, "wire_alone": own["nu_wire_alone"]}, settings=settings_of(size),
         needed="at least 2 seeds for an interval" if low is None else "",
     )  # fmt: skip
 
@@ -143,7 +149,9 @@ def _moduli(size: Size, results: Mapping[str, Any]) -> Verdict:
         f"{noise['realisations']:.0f} realisations at least. Our samples: E_s = {E_s['value'] / 1e6:.1f}{_bracket(E_s, 1e6)} MPa, "
         f"E_w = {E_w['value'] / 1e3:.0f}{_bracket(E_w, 1e3)} kPa, E_w/E_s = {100 * E_w['value'] / E_s['value']:.2g} % (study: 2 to 4 %).",
         value=E_w["value"], unit="Pa", low=E_w["low"], high=E_w["high"],
-        numbers={"planted_error": worst, "coverage": coverage, "E_s": E_s["value"], "E_w": E_w["value"], **by_pressure, "noise": dict(noise)},
+        numbers={
+            "planted_error": worst, "coverage": coverage, "E_s": E_s["value"], "E_w": E_w["value"], **by_pressure, "noise": dict(noise),
+        },
         settings=settings_of(size),
     )  # fmt: skip
 
@@ -162,7 +170,8 @@ def _yield_fit(_size: Size, _results: Mapping[str, Any]) -> Verdict:
         "bar, and another one is as good by this measure.",
         value=robust.angle, unit="rad",
         numbers={
-            "C_0_least_absolute": robust.C_0, "theta_least_absolute": robust.angle, "unique": robust.unique, "C_0_least_squares": squares.C_0,
+            "C_0_least_absolute": robust.C_0, "theta_least_absolute": robust.angle, "unique": robust.unique,
+            "C_0_least_squares": squares.C_0,
             "theta_least_squares": squares.angle,
         },
         settings={"data": "Table 3 of the study"},
@@ -175,14 +184,15 @@ def _outlier(size: Size, results: Mapping[str, Any]) -> Verdict:
     law, _ = _law(results)
     tau = {float(k.split("@")[1]): v["value"] for k, v in law["estimates"].items() if k.startswith("tau_y@")}
     ordered = [tau[p] for p in sorted(tau)]
-    rising = all(b > a for a, b in zip(ordered[:-1], ordered[1:], strict=True))
+    rising = all(b > a for a, b in pairwise(ordered))
     told = ", ".join(f"{tau[p] / 1e3:.1f} kPa at {p / 1e3:g} kPa" for p in sorted(tau))
     return Verdict(
         claim=67,
         outcome=decided(abs(residual + 4157.0) < 1.0 and rising),
         sentence=f"The value at 0.9 bar lies {-residual:.0f} Pa below the published line. Our yield stresses (0.02 % offset): {told}"
         + (", rising." if rising else ", not rising throughout."),
-        value=residual, unit="Pa", numbers={"residual": residual, **{f"tau_y@{p:g}": v for p, v in tau.items()}}, settings=settings_of(size),
+        value=residual, unit="Pa",
+        numbers={"residual": residual, **{f"tau_y@{p:g}": v for p, v in tau.items()}}, settings=settings_of(size),
     )  # fmt: skip
 
 
@@ -245,7 +255,8 @@ def _valley(size: Size, results: Mapping[str, Any]) -> Verdict:
         value=monotone,
         numbers={
             "condition_monotone": monotone, "condition_reversal": reversal, "error_reversal": back,
-            "H_k_error_monotone": data["table_3"]["monotone"]["H_k_error"], "H_eff_error_monotone": data["table_3"]["monotone"]["H_eff_error"],
+            "H_k_error_monotone": data["table_3"]["monotone"]["H_k_error"],
+            "H_eff_error_monotone": data["table_3"]["monotone"]["H_eff_error"],
             "condition_unloading_in_compression": data["table_3"]["condition"]["unloading"],
         },
         settings={"planted": {"table_3": TABLE_3.to_json()}, "pressures [Pa]": [5e4, 7e4, 9e4], "path": [0.0, -0.01, 0.006, -0.01]},

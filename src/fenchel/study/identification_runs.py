@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -148,7 +149,7 @@ def planted_tests(
     seed: int = 0,
 ) -> list[Curves]:
     """Tests made by the law itself; `noise` is relative to the pressure (stress) and to 1e-3 (strain)."""
-    legs = [np.linspace(a, b, max(2, round(abs(b - a) / step) + 1)) for a, b in zip(path[:-1], path[1:], strict=True)]
+    legs = [np.linspace(a, b, max(2, round(abs(b - a) / step) + 1)) for a, b in pairwise(path)]
     axial = np.concatenate([[path[0]], *(leg[1:] for leg in legs)])
     leg = np.concatenate([[0], *(np.full(len(part) - 1, k) for k, part in enumerate(legs))])
     rng = np.random.default_rng([13, seed])

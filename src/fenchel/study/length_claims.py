@@ -1,8 +1,9 @@
 r"""Part H: the characteristic length λ̄^m_max of a deposit and of a triaxial test of the same grains and wires.
 
 Lengths in mean grain radii. The wires of the deposit are released without tension, those of the triaxial test pull from the preparation
-on, as in the study; beside it stands the test of wires that are free of tension at its start. A maximum over many links is never small, so every length stands beside that of tensions shuffled along the
-wires. Ratios are paired by seed and averaged as logarithms.
+on, as in the study; beside it stands the test of wires that are free of tension at its start. A maximum over many
+links is never small, so every length stands beside that of tensions shuffled along the wires. Ratios are paired by seed and averaged as
+logarithms.
 """
 
 from __future__ import annotations
@@ -185,7 +186,8 @@ def _lengths(state: _State) -> Verdict:
         f"one link is {state.slope[0].spacing:.2f} radii, the longest wire {longest:.0f}.",
         value=slope.value, unit="mean radii", low=slope.low, high=slope.high,
         numbers={
-            "slope": slope.numbers(), "triaxial": test.numbers(), "triaxial_free": free.numbers(), "slope_by_seed": [s.at_three for s in state.slope],
+            "slope": slope.numbers(), "triaxial": test.numbers(), "triaxial_free": free.numbers(),
+            "slope_by_seed": [s.at_three for s in state.slope],
             "triaxial_by_seed": [s.at_three for s in state.test], "longest_wire": longest, "link": state.slope[0].spacing,
         },
         settings=state.settings,

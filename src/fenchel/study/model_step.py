@@ -165,7 +165,7 @@ def _pairs(rng: Generator, n: int) -> dict[str, Array]:
 
 def _reference(entry: Entry, rng: Generator, n: int) -> dict[str, float]:
     """Compiled steps of a law against its cone program as clarabel leaves it: stress and state, and the certified gap over the energy."""
-    law, dt, values = entry.law, entry.worked.dt, entry.values | warmth(entry.law)
+    law, dt, values = entry.law, entry.worked.dt, dict(entry.values) | warmth(entry.law)
     update = law.compile()
     old = update(0.5 * corners(entry, rng, n, 1), None, dt, **values).state
     strain = corners(entry, rng, n, 1)

@@ -23,7 +23,7 @@ BODIES = ("sand", "texsol")
 def _law(entry: Entry, rng: np.random.Generator, n: int) -> dict[str, float]:
     """The tangent of compiled steps from different states against differences of the stress, over the largest stiffness."""
     law, dt, size = entry.law, entry.worked.dt, magnitude(entry)
-    update, values = law.compile(), entry.values | warmth(law)
+    update, values = law.compile(), dict(entry.values) | warmth(law)
     strains = corners(entry, rng, n, 1)
     third = n // 3
     strains[:third] += rng.normal(size=(third, 1)) * np.abs(strains).max() * IDENTITY

@@ -82,7 +82,7 @@ def _derivatives(strain: Array, out: Any) -> dict[str, float]:
 
 
 def _supremum(s: Array, lam: float, mu: float) -> float:
-    """ψ_w*(s) by a semidefinite program; +∞ if it is unbounded."""
+    """s:ε − ψ_w(ε) where a semidefinite program leaves ε; +∞ if it is unbounded."""
     import cvxpy as cp
 
     eps, part, t = cp.Variable(6), cp.Variable(6), cp.Variable(nonneg=True)
@@ -92,7 +92,10 @@ def _supremum(s: Array, lam: float, mu: float) -> float:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")  # asked for more than it can reach; what was reached is compared
         problem.solve(solver=cp.CLARABEL, tol_gap_abs=1e-11, tol_gap_rel=1e-11, tol_feas=1e-11)
-    return np.inf if "unbounded" in str(problem.status) else float(problem.value)  # type: ignore[arg-type]
+    if eps.value is None:
+        return np.inf
+    found = np.asarray(eps.value)
+    return float(s @ found - unilateral_energy(found, lam, mu))
 
 
 def _conjugates(rng: np.random.Generator, n: int) -> float:

@@ -23,7 +23,8 @@ _STYLE = """
 body{max-width:60rem}
 .pass{color:#1b5e20}.fail{color:#a02020}.undecided{color:#7a5c00}
 b.pass::before{content:"\\2713 "}b.fail::before{content:"\\2717 "}b.undecided::before{content:"? "}
-.pair{display:flex;gap:1.2rem;align-items:center}.pair figure{flex:3}.pair p{flex:1;font-size:.9rem;color:#555;border-left:2px solid #ddd;padding-left:.8rem}
+.pair{display:flex;gap:1.2rem;align-items:center}.pair figure{flex:3}
+.pair p{flex:1;font-size:.9rem;color:#555;border-left:2px solid #ddd;padding-left:.8rem}
 @media(max-width:45rem){.pair{display:block}}
 article{margin:1.2rem 0;border-top:1px solid #eee}article p{margin:.3rem 0}
 .criterion{font-size:.9rem;color:#555}

@@ -185,7 +185,8 @@ def _rigid_linear(s: _State) -> Verdict:
         sentence=f"Rigid wires: R² at least {r:.3f}; half the tolerance and half the step change the slope by "
         f"{100 * mean.value:.1f} % in the "
         f"mean, {100 * worst:.0f} % at most. Another step is another sample: the preparation takes another way.",
-        value=r, numbers={"r_squared": r, "change_mean": mean.value, "change_low": mean.low, "change_high": mean.high, "change_worst": worst},
+        value=r,
+        numbers={"r_squared": r, "change_mean": mean.value, "change_low": mean.low, "change_high": mean.high, "change_worst": worst},
         settings=s.settings, needed="about 5 seeds" if unsure else "",
     )  # fmt: skip
 
