@@ -64,6 +64,9 @@ def replace_file(path: Path | str, data: bytes) -> None:
         ) from None
 
 
+_PROVENANCE = ("format", "program", "python", "conventions", "units", "versions", "machine", "source")
+
+
 def _put(group: Any, name: str, value: Any) -> None:
     if isinstance(value, dict):
         inner = group.create_group(name)
@@ -104,6 +107,11 @@ def save_run(path: Path | str, content: dict[str, Any], settings: dict[str, Any]
     """
     import h5py
 
+    taken = set(content) & {*_PROVENANCE, "settings"}
+    if taken:
+        raise ValueError(
+            f"{path}: the name {sorted(taken)[0]!r} is one of the file itself; call that result something else"
+        )
     image = io.BytesIO()
     with h5py.File(image, "w") as file:
         file.attrs["format"] = FORMAT
@@ -151,6 +159,6 @@ def load_run(path: Path | str) -> tuple[dict[str, Any], dict[str, Any]]:
             )
         content = _take(file)
     settings = json.loads(content.pop("settings"))
-    for name in ("format", "program", "python", "conventions", "units", "versions", "machine", "source"):
+    for name in _PROVENANCE:
         content.pop(name, None)
     return content, settings

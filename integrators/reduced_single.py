@@ -55,6 +55,51 @@ def _powers(f, out, powers):
     return total
 
 
+# at module level: numba finds a function in its index again only if what it calls is the same object in every process
+@njit(folder=_FOLDER)
+def _drawn_in(law, trial, w, s, gamma, c, z, out, size):
+    """Factor on the trial: along the ray to zero force, which is admissible, until |f| is small beside its terms there.
+
+    By convexity f(λ z) ≤ λ f(z), so that the first factor is on one side of small; else to twice what is inside. `size`: where the size of
+    f at zero force stands.
+    """
+    floor = NEAR * out[size]
+    low, high, inside, outside = 0.0, 1.0, -floor, out[0]
+    length = floor / outside
+    for _ in range(60):
+        if not length > 0.0:
+            length = 0.5 * high
+        for k in range(z.shape[0]):
+            z[k] = length * trial[k] if w[k] > 0.0 else trial[k]
+        law(z, s, gamma, c, 0, out)
+        if abs(out[0]) <= floor:
+            return length
+        if out[0] <= 0.0:
+            low, inside = length, out[0]
+        else:
+            high, outside = length, out[0]
+        if high <= 2.0 * low:
+            break
+        length = low + (high - low) * inside / (inside - outside)
+        if not length > 2.0 * low:
+            length = math.sqrt(low * high)
+    return high
+
+
+@njit(folder=_FOLDER)
+def _halved(law, trial, w, s, gamma, c, z, out):
+    """Factor on the trial by halving, at most twice what is inside."""
+    length = 1.0
+    for _ in range(60):
+        length *= 0.5
+        for k in range(z.shape[0]):
+            z[k] = length * trial[k] if w[k] > 0.0 else trial[k]
+        law(z, s, gamma, c, 0, out)
+        if out[0] <= 0.0:
+            return 2.0 * length
+    return length
+
+
 def _method(
     n: int, moving: int, frozen: int, r0: int, norm: int, soft: int, phi: int, nonlinear: int, curved: int
 ) -> Any:
@@ -67,47 +112,6 @@ def _method(
     block = forces + moving
     powers = block + moving * moving
     data = moving + frozen
-
-    @njit(folder=_FOLDER)
-    def drawn_in(law, trial, w, s, gamma, c, z, out):
-        """Factor on the trial: along the ray to zero force, which is admissible, until |f| is small beside its terms there.
-
-        By convexity f(λ z) ≤ λ f(z), so that the first factor is on one side of small; else to twice what is inside.
-        """
-        floor = NEAR * out[powers + 9]
-        low, high, inside, outside = 0.0, 1.0, -floor, out[0]
-        length = floor / outside
-        for _ in range(60):
-            if not length > 0.0:
-                length = 0.5 * high
-            for k in range(n):
-                z[k] = length * trial[k] if w[k] > 0.0 else trial[k]
-            law(z, s, gamma, c, 0, out)
-            if abs(out[0]) <= floor:
-                return length
-            if out[0] <= 0.0:
-                low, inside = length, out[0]
-            else:
-                high, outside = length, out[0]
-            if high <= 2.0 * low:
-                break
-            length = low + (high - low) * inside / (inside - outside)
-            if not length > 2.0 * low:
-                length = math.sqrt(low * high)
-        return high
-
-    @njit(folder=_FOLDER)
-    def halved(law, trial, w, s, gamma, c, z, out):
-        """Factor on the trial by halving, at most twice what is inside."""
-        length = 1.0
-        for _ in range(60):
-            length *= 0.5
-            for k in range(n):
-                z[k] = length * trial[k] if w[k] > 0.0 else trial[k]
-            law(z, s, gamma, c, 0, out)
-            if out[0] <= 0.0:
-                return 2.0 * length
-        return length
 
     def project(law, trial, coefficients, first, plan, found, status, count):
         step = 1 if coefficients.shape[0] > 1 else 0
@@ -158,9 +162,9 @@ def _method(
                     w[0], iw[0] = weight_q, 1.0 / math.sqrt(weight_q) if weight_q > 0.0 else 0.0
                 if drawable and (attempt == 1 or out[0] > FAR * out[powers + 9]):
                     length = (
-                        drawn_in(law, zt, w, s, gamma, c, z, out)
+                        _drawn_in(law, zt, w, s, gamma, c, z, out, powers + 9)
                         if attempt == 0
-                        else halved(law, zt, w, s, gamma, c, z, out)
+                        else _halved(law, zt, w, s, gamma, c, z, out)
                     )
                     for k in range(n):
                         z[k], e[k] = zt[k], 0.0

@@ -112,6 +112,15 @@ def test_a_failure_stops_the_campaign_or_is_a_result(tmp_path):
     assert not any(line.startswith("begin 2") for line in lines(tmp_path))
 
 
+def program(folder: str) -> dict:
+    return {"program": "mine"}
+
+
+def test_a_result_may_not_take_the_name_of_what_the_file_says_of_itself(tmp_path):
+    with pytest.raises(ValueError, match="'program' is one of the file itself"):
+        Computation("named", program, tmp_path, {"folder": ""})()
+
+
 def test_what_is_no_campaign(tmp_path):
     with pytest.raises(InputError, match="two tasks are called 'square 1'"):
         run_campaign([task(tmp_path, 1.0), task(tmp_path, 1.0)], tmp_path, show=False)

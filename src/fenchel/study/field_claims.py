@@ -20,7 +20,7 @@ from ..dem.record import mandel
 from ..errors import FenchelError
 from ..identify.tasks import Prepare, Test
 from .bead_claims import moved
-from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided
 from .deposit_claims import settings_of
 from .field_measures import branches, mean_pressure, sphere_stress
 from .grain_runs import BASE, PRESSURE, triaxial
@@ -160,15 +160,16 @@ def _one_strain(s: _State) -> Verdict:
         )
     found, corrected = mean_of([r.mismatch for r in rows]), mean_of([r.corrected for r in rows])
     noise, low, high = (float(np.mean([getattr(r, name) for r in rows])) for name in ("noise", "low", "high"))
+    outcome: Outcome = PASS if high < 0.1 else FAIL if low > 0.1 and corrected.value > 0.1 else UNDECIDED
     return Verdict(
         claim=60,
-        outcome=PASS if high < 0.1 else FAIL if low > 0.1 and corrected.value > 0.1 else UNDECIDED,
+        outcome=outcome,
         sentence=f"‖ε_s − ε_w‖/‖ε_s‖ is {found.text('.2g')} at 1 % (bootstrap [{low:.2g}, {high:.2g}]), {corrected.value:.2g} less "
         f"what noise adds; "
         f"two halves of the grains differ by {noise:.2g}.",
         value=found.value, low=low, high=high,
         numbers={"mismatch": found.numbers(), "corrected": corrected.numbers(), "halves_of_grains": noise}, settings=s.settings,
-        needed="" if high < 0.1 or low > 0.1 else "samples of more grains: the bootstrap interval contains 10 %",
+        needed="" if outcome != UNDECIDED else "samples of more grains: the bootstrap interval contains 10 %",
     )  # fmt: skip
 
 

@@ -202,7 +202,7 @@ def fenchel_equality(seed: int, count: int, programs: int) -> dict[str, Any]:
 
     numbers = {
         "equality": worst("rule", "supremum", "stress first"),
-        "below": worst("below"),
+        "below": max(0.0, worst("below")),
         "programs": worst("shares", "shares, below", "program"),
         "outside": worst("outside"),
         "energies": len(distinct_energies()),

@@ -26,7 +26,9 @@ from ..identify.tasks import Prepare, Test
 from .grain_runs import Setting, study_of
 from .sizes import Size, size_named
 
-__all__ = ["GRAINS", "TABLE_3", "identify_study", "identify_tasks", "planted", "planted_tests"]
+__all__ = [
+    "GRAINS", "TABLE_3", "choice_task", "identify_study", "identify_tasks", "planted", "planted_tasks", "planted_tests",
+]  # fmt: skip
 
 Array = NDArray[np.float64]
 
@@ -243,6 +245,17 @@ def identify_tasks(size: Size, folder: Path) -> list[Task]:
         *tests,
         Computation("L: identification", identified, folder, {"size": size.name}, names, cost=8.0, in_folder=True),
     ]
+
+
+def choice_task(size: Size, folder: Path) -> Computation:
+    """The three costs on the linked tests of the identification."""
+    from .formulation_choice import discrete_choice
+
+    linked = [t for t in _runs(size, folder)[1] if t.linked]
+    return Computation(
+        "choice: grains", discrete_choice, folder, {"files": [t.run_file.name for t in linked], "seed": 1},
+        tuple(t.name for t in linked), cost=6.0, in_folder=True,
+    )  # fmt: skip
 
 
 def planted_tasks(size: Size, folder: Path) -> list[Task]:

@@ -85,13 +85,13 @@ def wanted_claims(words: Sequence[str]) -> tuple[frozenset[int], frozenset[str]]
 def _tasks(size: Size, folder: Path, claims: frozenset[int], extras: frozenset[str]) -> list[Task]:
     """Everything that is needed, each task once."""
     from . import formulation_choice
-    from .identification_runs import identify_tasks
+    from .identification_runs import choice_task, identify_tasks
 
     every: list[Task] = [task for part in all_parts() for task in part.tasks(size, folder, claims)]
     if "headlines" in extras:
         every += headline_tasks(size, folder)
     if "choice" in extras:
-        every += [*formulation_choice.tasks(size, folder), *identify_tasks(size, folder)]
+        every += [*formulation_choice.tasks(size, folder), *identify_tasks(size, folder), choice_task(size, folder)]
     table: dict[str, Task] = {}
     for task in every:
         if table.setdefault(task.name, task) != task:

@@ -42,7 +42,7 @@ SIZES = {
             name="medium", grains=4000, seeds=5, fine_grains=1000, fine_seeds=3,
             wire_stiffness=(1.0, 3.0, 10.0, 30.0, 100.0, 1000.0), bead_ratios=(0.5, 0.4, 0.3, 0.2, 0.15, 0.1), identify_grains=1000,
             identify_seeds=3, pressures=(5e4, 7e4, 8e4, 9e4), held_out=(6e4,), permutations=1999, sweep=3, columns=(10, 20, 40),
-            samples=1000,
+            samples=400,
         ),
         Size(
             name="paper", grains=10_000, seeds=5, fine_grains=3000, fine_seeds=5,
