@@ -83,6 +83,8 @@ def test_the_same_again_gives_the_same_bytes_without_a_run(toy, monkeypatch):
     folder, _ = toy
     before = (folder / "claims.json").read_bytes()
     monkeypatch.setitem(sizes.SIZES, "toy", TOY)
+    for name in ("tolerance", "step", "bead radius"):
+        monkeypatch.delitem(VARIED, name)
     monkeypatch.setattr(
         "fenchel.dem.slope.SlopeDeposit.advance", lambda self: pytest.fail("a finished run was run again")
     )
@@ -147,6 +149,8 @@ def test_a_run_that_failed_leaves_its_claims_undecided_and_says_why(toy, monkeyp
         assert verdict.outcome == "undecided" and "does not come to rest" in verdict.sentence
     theorem = LENGTH.judge(TOY, folder / "runs", results, frozenset({41}))[0]
     assert theorem.outcome == "fail"
+    for name in ("tolerance", "step", "bead radius"):
+        monkeypatch.delitem(VARIED, name)
     lost = headlines(
         TOY, folder / "runs", dict(found.results) | {"vary friction deposit, seed 1: linked": ConvergenceError("no")}
     )
