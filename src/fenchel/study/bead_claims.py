@@ -20,7 +20,7 @@ from ..dem.storage import load_run
 from ..errors import FenchelError
 from ..identify.tasks import Prepare, Test
 from .active_segments import network_of
-from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided, judged, taken, unjudged
 from .grain_runs import BEADS, PRESSURE, bead_label, beads_study
 from .sizes import Size
 from .statistics import Mean, mean_of
@@ -108,9 +108,7 @@ class _State:
             self.found[ratio] = []
             for seed in range(1, size.fine_seeds + 1):
                 name = f"{bead_label(ratio)}, seed {seed}"
-                record = results[f"{name}: {PRESSURE / 1e3:g} kPa, links on"]
-                if isinstance(record, FenchelError):
-                    raise record
+                record = taken(results, f"{name}: {PRESSURE / 1e3:g} kPa, links on")
                 test, prepare = tasks[f"{name}: {PRESSURE / 1e3:g} kPa, links on"], tasks[f"{name}: preparation"]
                 assert isinstance(test, Test) and isinstance(prepare, Prepare)
                 self.found[ratio].append(phases(prepare, test, record.series["kinetic"], min(size.permutations, 400)))
@@ -141,16 +139,13 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {48: _parting, 49: _sliding, 50: _directed, 51: _thin, 52: _threshold}
-    numbers = sorted(wanted & BEAD.numbers)
-    if not numbers:
+    if not wanted & BEAD.numbers:
         return []
     try:
         state = _State(size, folder, results)
     except FenchelError as problem:
-        return [
-            Verdict(claim=n, outcome=UNDECIDED, sentence=str(problem), needed="a run that converges") for n in numbers
-        ]
-    return [makers[n](state) for n in numbers]
+        return unjudged(CLAIMS, wanted, problem)
+    return judged(CLAIMS, wanted, lambda n: makers[n](state))
 
 
 def _parting(s: _State) -> Verdict:

@@ -8,9 +8,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..campaign import Task
+from ..errors import FenchelError
 from .sizes import Size
 
-__all__ = ["FAIL", "PASS", "UNDECIDED", "Claim", "Part", "Picture", "Verdict", "decided"]
+__all__ = ["FAIL", "PASS", "UNDECIDED", "Claim", "Part", "Picture", "Verdict", "decided", "judged", "taken", "unjudged"]
 
 Outcome = Literal["pass", "fail", "undecided"]
 PASS: Outcome = "pass"
@@ -82,3 +83,43 @@ class Part:
 def decided(condition: bool) -> Outcome:
     """Pass or fail."""
     return PASS if condition else FAIL
+
+
+def taken(results: Mapping[str, Any], name: str) -> Any:
+    """What a task left; the error of one that failed is raised."""
+    found = results[name]
+    if isinstance(found, FenchelError):
+        raise found
+    return found
+
+
+def judged(
+    claims: Sequence[Claim],
+    wanted: frozenset[int],
+    make: Callable[[int], Verdict],
+    *,
+    needed: str = "a run that converges",
+) -> list[Verdict]:
+    """`make(number)` for every wanted claim; where that raises, the verdict of `unjudged`."""
+    out: list[Verdict] = []
+    for claim in claims:
+        if claim.number not in wanted:
+            continue
+        try:
+            out.append(make(claim.number))
+        except FenchelError as problem:
+            out += unjudged([claim], wanted, problem, needed=needed)
+    return out
+
+
+def unjudged(
+    claims: Sequence[Claim], wanted: frozenset[int], problem: FenchelError, *, needed: str = "a run that converges"
+) -> list[Verdict]:
+    """Verdicts of the wanted claims whose runs failed: a theorem fails, any other claim is undecided and needs a run that does not."""
+    return [
+        Verdict(claim=claim.number, outcome=FAIL, sentence=str(problem))
+        if "T" in claim.kind
+        else Verdict(claim=claim.number, outcome=UNDECIDED, sentence=str(problem), needed=needed)
+        for claim in claims
+        if claim.number in wanted
+    ]

@@ -12,9 +12,8 @@ from typing import Any
 import numpy as np
 
 from ..campaign import Task
-from ..errors import FenchelError
 from ..identify.tasks import Prepare
-from .claim import UNDECIDED, Claim, Part, Verdict, decided
+from .claim import Claim, Part, Verdict, decided, judged, taken
 from .deposit_claims import gain, settings_of, slope_outcome
 from .grain_runs import BASE, deposits, triaxial
 from .sizes import Size
@@ -44,24 +43,12 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {1: _density, 2: _volume, 3: _angle}
-    out = []
-    for number in sorted(wanted & CONTEXT.numbers):
-        try:
-            out.append(makers[number](size, folder, results))
-        except FenchelError as problem:
-            out.append(Verdict(claim=number, outcome=UNDECIDED, sentence=str(problem), needed="a run that converges"))
-    return out
+    return judged(CLAIMS, wanted, lambda n: makers[n](size, folder, results))
 
 
 def _records(size: Size, folder: Path, results: Mapping[str, Any]) -> list[Any]:
-    out = []
-    for task in triaxial(size.grains, size.seeds, folder):
-        if isinstance(task, Prepare):
-            continue
-        if isinstance(results[task.name], FenchelError):
-            raise results[task.name]
-        out.append(results[task.name])
-    return out
+    tasks = triaxial(size.grains, size.seeds, folder)
+    return [taken(results, task.name) for task in tasks if not isinstance(task, Prepare)]
 
 
 def _density(size: Size, folder: Path, results: Mapping[str, Any]) -> Verdict:

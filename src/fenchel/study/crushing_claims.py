@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..campaign import Computation, Task
 from ..errors import FenchelError
-from .claim import FAIL, UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import Claim, Part, Picture, Verdict, decided, judged, taken
 from .crushing_runs import both_signs, refined, wire_map
 from .models import MODELS, SETS
 from .sizes import Size
@@ -96,24 +96,11 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, _folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {23: _elements, 24: _pressure, 25: _bounded, 26: _alike, 27: _platens}
-    out = []
-    for number in sorted(wanted & CRUSHING.numbers):
-        try:
-            out.append(makers[number](size, results))
-        except FenchelError as problem:
-            outcome, needed = (FAIL, "") if number == 24 else (UNDECIDED, "runs that converge")
-            out.append(Verdict(claim=number, outcome=outcome, sentence=str(problem), needed=needed))
-    return out
-
-
-def _take(results: Mapping[str, Any], name: str) -> Any:
-    if isinstance(results[name], FenchelError):
-        raise results[name]
-    return results[name]
+    return judged(CLAIMS, wanted, lambda n: makers[n](size, results), needed="runs that converge")
 
 
 def _maps(results: Mapping[str, Any], name: str, platens: str = "rough") -> dict[str, Any]:
-    return {model: _take(results, _map(name, model, platens)) for model in MODELS}
+    return {model: taken(results, _map(name, model, platens)) for model in MODELS}
 
 
 def _settings(*names: str, **more: Any) -> dict[str, Any]:
@@ -138,14 +125,14 @@ def _elements(size: Size, results: Mapping[str, Any]) -> Verdict:
     force = {model: float(m["force"][-1]) for model, m in maps.items()}
     meshes: dict[tuple[str, str], dict[str, Any]] = {}
     for model, integration in MESHED:
-        found = [_take(results, _mesh(model, n, integration)) for n in size.columns]
+        found = [taken(results, _mesh(model, n, integration)) for n in size.columns]
         meshes[model, integration] = {key: np.array([f[key] for f in found]) for key in ("force", "max", "mean", "q95")}
         limit, order = richardson(meshes[model, integration]["force"])
         at_400 = float(meshes[model, integration]["force"][size.columns.index(20)])
         meshes[model, integration] |= {"limit": limit, "order": order, "400 elements over limit": at_400 / limit - 1.0}
     one, full = meshes["texsol", "selective"], meshes["texsol", "full"]
     worst = max(abs(meshes[model, "selective"]["400 elements over limit"]) for model in MODELS)
-    twice = float(_take(results, "E: twice the steps")["force"][-1] / force["texsol"] - 1.0)
+    twice = float(taken(results, "E: twice the steps")["force"][-1] / force["texsol"] - 1.0)
     elements = {model: m["elements"] for model, m in maps.items()}
     return Verdict(
         claim=23,
@@ -177,7 +164,7 @@ def _pressure(_size: Size, results: Mapping[str, Any]) -> Verdict:
     both = [n for n, (low, high) in range_.items() if low < 0.0 < high]
     onset = {}
     for name in SEARCHED:
-        found = _take(results, f"E: both signs, {name}")
+        found = taken(results, f"E: both signs, {name}")
         cases = [k for k in found if isinstance(found[k], Mapping) and "lowest" in found[k]]
         onset[name] = {case: _first(found[case], found["shortening"]) for case in sorted(cases)}
     holds = max(highest.values()) <= 1e-12 and apart <= 1e-12

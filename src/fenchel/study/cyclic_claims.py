@@ -14,7 +14,7 @@ import numpy as np
 
 from ..campaign import Computation, Task
 from ..errors import FenchelError
-from .claim import UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import Claim, Part, Picture, Verdict, decided, judged, taken
 from .cyclic_runs import CRITERIA, LONG, LOOPS, elastic_slopes, in_order, loops_of, refinements, slope, table_rows
 from .cyclic_sweep import AXES, NAMES, WIRED, Sweep, axis_points, largest_box, main_effects, sweep_line, sweep_slice
 from .models import MODELS, SETS
@@ -87,25 +87,11 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, _folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {17: _stable, 18: _earlier, 19: _nearer, 20: _slopes, 21: _between, 22: _table_3}
-    out = []
-    for number in sorted(wanted & CYCLIC.numbers):
-        try:
-            out.append(makers[number](size, results))
-        except FenchelError as problem:
-            out.append(
-                Verdict(claim=number, outcome=UNDECIDED, sentence=str(problem), needed="runs that can be followed")
-            )
-    return out
-
-
-def _take(results: Mapping[str, Any], name: str) -> Any:
-    if isinstance(results[name], FenchelError):
-        raise results[name]
-    return results[name]
+    return judged(CLAIMS, wanted, lambda n: makers[n](size, results), needed="runs that can be followed")
 
 
 def _stated(results: Mapping[str, Any]) -> dict[str, Any]:
-    return {name: _take(results, _loops(name)) for name in STATED}
+    return {name: taken(results, _loops(name)) for name in STATED}
 
 
 def _settings(**more: Any) -> dict[str, Any]:
@@ -116,7 +102,7 @@ def _settings(**more: Any) -> dict[str, Any]:
 
 
 def _sweep(size: Size, results: Mapping[str, Any]) -> Sweep:
-    return Sweep([_take(results, _slice(x)) for x in axis_points("ratio", size.sweep).tolist()])
+    return Sweep([taken(results, _slice(x)) for x in axis_points("ratio", size.sweep).tolist()])
 
 
 def _swept(s: Sweep) -> dict[str, Any]:
@@ -126,7 +112,7 @@ def _swept(s: Sweep) -> dict[str, Any]:
 
 def _stable(_size: Size, results: Mapping[str, Any]) -> Verdict:
     last = {name: {m: float(found[m]["change"][-1]) for m in MODELS} for name, found in _stated(results).items()}
-    checks = _take(results, "D: steps and element")
+    checks = taken(results, "D: steps and element")
     worst = max(max(row.values()) for row in last.values())
     strict = [f"{model} of {name}" for name, row in last.items() for model, x in row.items() if x >= 1e-3]
     counts = {m: checks["loops"][m].tolist() for m in MODELS}
@@ -206,7 +192,7 @@ def _nearer(size: Size, results: Mapping[str, Any]) -> Verdict:
 
 
 def _slopes(size: Size, results: Mapping[str, Any]) -> Verdict:
-    found, extended = _take(results, "D: slopes"), _take(results, "D: loops into extension")
+    found, extended = taken(results, "D: slopes"), taken(results, "D: loops into extension")
     stated = _stated(results)
     worst = max(found["worst"].values())
     ratios = found["ratios"]
@@ -263,7 +249,7 @@ def _between(size: Size, results: Mapping[str, Any]) -> Verdict:
 
 
 def _table_3(_size: Size, results: Mapping[str, Any]) -> Verdict:
-    found, rows = _take(results, _loops("table 3")), _take(results, "D: rows of Table 3")
+    found, rows = taken(results, _loops("table 3")), taken(results, "D: rows of Table 3")
     counts = {m: int(found[m]["stabilised"][ONE]) for m in MODELS}
     shares = _shares(found)
     spread = max(counts.values()) - min(counts.values())

@@ -17,7 +17,7 @@ from ..campaign import Task
 from ..dem.bodies import Assembly
 from ..errors import FenchelError
 from .active_segments import Segments, network_of, segments
-from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided, judged, taken
 from .deposit import heap
 from .grain_runs import BASE, KINDS, deposits
 from .sizes import Size
@@ -46,10 +46,7 @@ CLAIMS = (
 
 def content_of(results: Mapping[str, Any], label: str, seed: int, kind: str) -> dict[str, Any]:
     """What a deposit left; its error, where it failed, is raised."""
-    found = results[f"{label} deposit, seed {seed}: {kind}"]
-    if isinstance(found, FenchelError):
-        raise found
-    return found
+    return taken(results, f"{label} deposit, seed {seed}: {kind}")
 
 
 def angles(results: Mapping[str, Any], label: str, seeds: int, kind: str) -> Array:
@@ -88,14 +85,8 @@ def settings_of(size: Size) -> dict[str, Any]:
 
 def _judge(size: Size, _folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {37: _rest, 38: _barriers, 39: _orthotropy, 40: _steeper}
-    out = []
     cache: dict[str, Any] = {}
-    for number in sorted(wanted & DEPOSIT.numbers):
-        try:
-            out.append(makers[number](size, results, cache))
-        except FenchelError as problem:
-            out.append(Verdict(claim=number, outcome=UNDECIDED, sentence=str(problem), needed="a run that converges"))
-    return out
+    return judged(CLAIMS, wanted, lambda n: makers[n](size, results, cache))
 
 
 def _segments(size: Size, results: Mapping[str, Any], cache: dict[str, Any]) -> list[Segments]:

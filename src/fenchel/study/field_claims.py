@@ -20,7 +20,7 @@ from ..dem.record import mandel
 from ..errors import FenchelError
 from ..identify.tasks import Prepare, Test
 from .bead_claims import moved
-from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided, judged, taken, unjudged
 from .deposit_claims import settings_of
 from .field_measures import branches, mean_pressure, sphere_stress
 from .grain_runs import BASE, PRESSURE, triaxial
@@ -50,12 +50,10 @@ CLAIMS = (
 class _State:
     def __init__(self, size: Size, folder: Path, results: Mapping[str, Any]) -> None:
         self.size, self.folder = size, folder
-        self.records, self.pairs = [], []
-        for seed in range(1, size.seeds + 1):
-            record = results[f"{BASE}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on"]
-            if isinstance(record, FenchelError):
-                raise record
-            self.records.append(record)
+        self.records = [
+            taken(results, f"{BASE}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on")
+            for seed in range(1, size.seeds + 1)
+        ]
         tasks = triaxial(size.grains, size.seeds, folder)
         self.pairs = [
             (p, t)
@@ -72,22 +70,13 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {59: _identities, 60: _one_strain, 61: _additive, 62: _sphere, 63: _measures}
-    numbers = sorted(wanted & FIELDS.numbers)
-    if not numbers:
+    if not wanted & FIELDS.numbers:
         return []
     try:
         state = _State(size, folder, results)
     except FenchelError as problem:
-        return [
-            Verdict(
-                claim=n,
-                outcome=FAIL if n in (59, 61) else UNDECIDED,
-                sentence=str(problem),
-                needed="a run that converges",
-            )
-            for n in numbers
-        ]
-    return [makers[n](state) for n in numbers]
+        return unjudged(CLAIMS, wanted, problem)
+    return judged(CLAIMS, wanted, lambda n: makers[n](state))
 
 
 def _off(a: Array, b: Array) -> float:

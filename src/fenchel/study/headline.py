@@ -17,6 +17,7 @@ from ..identify.curves import curves
 from ..identify.elastic import elastic_moduli
 from ..identify.options import IdentifyOptions
 from .active_segments import network_of
+from .claim import taken
 from .deposit import heap
 from .deposit_claims import content_of
 from .grain_runs import PRESSURE, VARIED, varied
@@ -58,9 +59,7 @@ def _of_seed(size: Size, folder: Path, results: Mapping[str, Any], name: str, se
     from ..dem.measures import active_length
 
     label, setting = f"vary {name}", VARIED[name]
-    record = results[f"{label}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on"]
-    if isinstance(record, FenchelError):
-        raise record
+    record = taken(results, f"{label}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on")
     linked, unlinked = (content_of(results, label, seed, kind) for kind in ("linked", "unlinked"))
     tops = [heap(content) for content in (linked, unlinked)]
     slope = active_length(network_of(linked, setting.friction)).radii

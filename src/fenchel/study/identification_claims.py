@@ -16,9 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..campaign import Task
-from ..errors import FenchelError
 from ..identify.yielding import least_absolute_line, least_squares_line
-from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Outcome, Part, Picture, Verdict, decided, judged, taken
 from .grain_runs import PRESSURE
 from .identification_runs import TABLE_3, identify_study, identify_tasks, planted_tasks
 from .sizes import Size
@@ -66,15 +65,8 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
     return tasks
 
 
-def _result(results: Mapping[str, Any], name: str) -> dict[str, Any]:
-    found = results[name]
-    if isinstance(found, FenchelError):
-        raise found
-    return found
-
-
 def _law(results: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
-    found = _result(results, "L: identification")
+    found = taken(results, "L: identification")
     return json.loads(found["identification"]), found
 
 
@@ -94,13 +86,7 @@ def _judge(size: Size, _folder: Path, results: Mapping[str, Any], wanted: frozen
     makers = {
         64: _poisson, 65: _moduli, 66: _yield_fit, 67: _outlier, 68: _constant, 69: _valley, 70: _updating, 71: _replayed,
     }  # fmt: skip
-    out = []
-    for number in sorted(wanted & IDENTIFICATION.numbers):
-        try:
-            out.append(makers[number](size, results))
-        except FenchelError as problem:
-            out.append(Verdict(claim=number, outcome=UNDECIDED, sentence=str(problem), needed="runs that converge"))
-    return out
+    return judged(CLAIMS, wanted, lambda n: makers[n](size, results), needed="runs that converge")
 
 
 def _poisson(size: Size, results: Mapping[str, Any]) -> Verdict:
@@ -133,7 +119,7 @@ def _bracket(estimate: Mapping[str, Any], scale: float = 1.0, form: str = ".3g")
 
 def _moduli(size: Size, results: Mapping[str, Any]) -> Verdict:
     law, _ = _law(results)
-    data = _result(results, "L: planted data")
+    data = taken(results, "L: planted data")
     worst = max(abs(data[name][key]) for name in ("table_3", "grains") for key in ("E_s", "E_w", "nu"))
     noise = data["noise"]
     coverage = min(noise[f"{key}_coverage"] for key in ("E_s", "E_w", "nu"))
@@ -238,7 +224,7 @@ def _constant(size: Size, results: Mapping[str, Any]) -> Verdict:
 
 
 def _valley(size: Size, results: Mapping[str, Any]) -> Verdict:
-    data = _result(results, "L: planted data")
+    data = taken(results, "L: planted data")
     monotone = min(data[n]["condition"]["monotone"] for n in ("table_3", "grains"))
     reversal = max(data[n]["condition"]["reversal"] for n in ("table_3", "grains"))
     only_there = not any(data[n]["monotone"]["separable"] for n in ("table_3", "grains"))
@@ -264,7 +250,7 @@ def _valley(size: Size, results: Mapping[str, Any]) -> Verdict:
 
 
 def _updating(_size: Size, results: Mapping[str, Any]) -> Verdict:
-    data = _result(results, "L: planted data")
+    data = taken(results, "L: planted data")
     back = {f"{n}_{k}": abs(data[n][k]) for n in ("table_3", "grains") for k in ("H_k", "H_i")}
     worst = max(back.values())
     return Verdict(

@@ -20,7 +20,7 @@ from ..dem.measures import Network
 from ..dem.storage import load_run
 from ..errors import FenchelError
 from .active_segments import MULTIPLES, Segments, definition_holds, knee, network_of, segments
-from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided, judged, taken, unjudged
 from .deposit_claims import content_of, deposit_segments, settings_of
 from .field_measures import over_seeds, scatter
 from .grain_runs import BASE, FREE, TAUT, Setting, deposits, taut_tests, triaxial
@@ -91,22 +91,14 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {41: _definition, 42: _three, 43: _lengths, 44: _ratio, 45: _chance, 46: _domain, 47: _straight}
-    out: list[Verdict] = []
     try:
-        for name, found in results.items():
-            if name.startswith((f"{BASE}, ", f"{TAUT}, ")) and isinstance(found, FenchelError):
-                raise found
+        for name in results:
+            if name.startswith((f"{BASE}, ", f"{TAUT}, ")):
+                taken(results, name)
         state = _State(size, folder, results)
     except FenchelError as problem:
-        return [
-            Verdict(
-                claim=n, outcome=FAIL if n == 41 else UNDECIDED, sentence=str(problem), needed="a run that converges"
-            )
-            for n in sorted(wanted & LENGTH.numbers)
-        ]
-    for number in sorted(wanted & LENGTH.numbers):
-        out.append(makers[number](state))
-    return out
+        return unjudged(CLAIMS, wanted, problem)
+    return judged(CLAIMS, wanted, lambda n: makers[n](state))
 
 
 class _State:

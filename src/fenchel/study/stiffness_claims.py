@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ..campaign import Task
 from ..dem.record import TriaxialRecord
 from ..errors import FenchelError
-from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided
+from .claim import FAIL, PASS, UNDECIDED, Claim, Part, Picture, Verdict, decided, judged, taken, unjudged
 from .grain_runs import PRESSURE, RADIUS, STIFF, stiffness_label, stiffness_runs
 from .models import equivalent_stress
 from .sizes import Size
@@ -110,10 +110,7 @@ def _curves(size: Size, results: Mapping[str, Any]) -> Table:
     for label in labels:
         table[label] = []
         for seed in range(1, size.fine_seeds + 1):
-            found = results[f"{label}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on"]
-            if isinstance(found, FenchelError):
-                raise found
-            table[label].append(wire_curve(found))
+            table[label].append(wire_curve(taken(results, f"{label}, seed {seed}: {PRESSURE / 1e3:g} kPa, links on")))
     return table
 
 
@@ -143,16 +140,13 @@ def _tasks(size: Size, folder: Path, wanted: frozenset[int]) -> list[Task]:
 
 def _judge(size: Size, _folder: Path, results: Mapping[str, Any], wanted: frozenset[int]) -> list[Verdict]:
     makers = {53: _linear, 54: _rigid_linear, 55: _shift, 56: _shift_grows, 57: _event, 58: _limit}
-    numbers = sorted(wanted & STIFFNESS.numbers)
-    if not numbers:
+    if not wanted & STIFFNESS.numbers:
         return []
     try:
         state = _State(size, results)
     except FenchelError as problem:
-        return [
-            Verdict(claim=n, outcome=UNDECIDED, sentence=str(problem), needed="a run that converges") for n in numbers
-        ]
-    return [makers[n](state) for n in numbers]
+        return unjudged(CLAIMS, wanted, problem)
+    return judged(CLAIMS, wanted, lambda n: makers[n](state))
 
 
 def _linear(s: _State) -> Verdict:
