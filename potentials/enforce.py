@@ -47,6 +47,8 @@ def enforce(law: Law, values: Mapping[str, float]) -> None:
     if key in known:
         return
     failed = _first_failure(record, key)
+    if failed is not None and failed[-1] != failed[-1]:
+        failed = (failed[0], _culprits(record, values) or failed[1], *failed[2:])
     if failed is not None:
         from .admissibility import check
 
@@ -72,13 +74,24 @@ def _first_failure(record: ModuleType, values: tuple[float, ...]) -> Any:
     return None
 
 
+def _culprits(record: ModuleType, values: Mapping[str, float]) -> str:
+    """Parameters of which a change of any one makes every condition a number."""
+    found = []
+    for name, value in values.items():
+        moved = {**values, name: value + 1e-3 * (abs(value) or 1.0) * (-1.0 if value > 0.0 else 1.0)}
+        failed = _first_failure(record, tuple(moved.values()))
+        if failed is None or failed[-1] == failed[-1]:
+            found.append(name)
+    return " ".join(found)
+
+
 def _reason(
     law: Law, about: str, names: str, variables: str, text: str, value: float, values: Mapping[str, float]
 ) -> str:
     involved = names.split()
     shown = ", ".join(f"{n} = {values[n]:g}" for n in involved)
     if value != value:
-        return f"{shown} make a modulus infinite; Poisson ratios lie strictly between -1 and 1/2"
+        return f"{shown} {'makes' if len(involved) == 1 else 'make'} a modulus infinite; Poisson ratios lie strictly between -1 and 1/2"
     potential, _, what = about.partition(" ")
     moved = variables.split()
     if what == "norm":

@@ -178,7 +178,10 @@ CELLS: list[Cell] = [
         )
         for change in ENDS
     ),
-    *(Cell("infinite moduli", f"nu_s {nu:g}", lambda nu=nu: infinite(nu), says="infinite") for nu in (0.5, -1.0)),
+    *(
+        Cell("infinite moduli", f"nu_s {nu:g}", lambda nu=nu: infinite(nu), says=f"nu_s = {nu:g} makes")
+        for nu in (0.5, -1.0)
+    ),
     Cell("one step", "100 % axial strain", all_at_once),
     *(Cell("axes of matrices", kind, lambda kind=kind: axes(kind)) for kind in awkward_matrices()),
 ]
