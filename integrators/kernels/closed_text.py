@@ -7,7 +7,7 @@ With B = dev Σ a_k A_k at frozen internal variables, q = ‖B‖:
     apex     γ = (f − a q)/w_m;                                    dev ΔX_k = a_k B/w_q;
 
 and tr ΔX_k = 3 b_k γ, Δs_j = r_j γ in both; the dissipation is k γ. That the apex is right wherever the cone formula leaves q < 0 follows
-from convexity. The tangent is c₀ 𝕀 + c₁ I⊗I + c₂ B⊗B + c₃ (B⊗I + I⊗B). Written per layout of the state, for the components that exist and
+from convexity. The tangent is c₀ 𝕀 + c₁ I⊗I + c₂ n⊗n + c₃ (n⊗I + I⊗n), n = B/q. Written per layout of the state, for the components that exist and
 the precision of the arrays (all arithmetic is in float64); a law enters through numbers.
 
 Coefficients: a, w_q, w_m, g_q, g_T, f at zero, k, stiffness pair, stress at zero; per tensor k_B, k_T, a_k, b_k, moduli pair; per scalar
@@ -88,11 +88,10 @@ def closed_text(size: int, plan: Sequence[int], single: bool) -> str:
         o = HEAD + 6 * tensors + 2 * j
         add(2, f"r{j} = {wide(f'x[{places[tensors + j]}]', single)}", f"f += c{o} * r{j}")
     add(2, "f += c0 * q", "gamma, slip, p_qq, p_qt, p_tt = 0.0, 0.0, 0.0, 0.0, 0.0", "flag = 0")
-    add(2, "inverse = 1.0 / q if q > 0.0 else 0.0")
     add(2, "if not f <= 0.0:")
     add(3, "p_tt = 1.0 / h", "gamma = f * p_tt", "if not h > 0.0:", "    flag = 3")
     add(3, "if q >= gamma * c0 * c1:")
-    add(4, "slip = gamma * c0 * inverse", "p_qt = c0 * p_tt", "p_qq = c0 * p_qt")
+    add(4, "slip = gamma * c0 / q if q > 0.0 else 0.0", "p_qt = c0 * p_tt", "p_qq = c0 * p_qt")
     add(3, "else:")
     add(4, "slip = 1.0 / c1", "p_qq, p_tt = slip, 0.0")
     add(4, "if c2 > 0.0:", "    p_tt = 1.0 / c2", "    gamma = (f - c0 * q) / c2")
@@ -116,7 +115,9 @@ def closed_text(size: int, plan: Sequence[int], single: bool) -> str:
     add(2, f"{', '.join(f'{force}[{i}]' for i in n)} = {row('s')}")
     add(2, "if want:")
     add(3, "drop = c3 * w", f"k0 = {sign}(c7 - drop)", f"k1 = {sign}(c8 + drop * THIRD - c4 * c4 * p_tt)")
-    add(3, f"k2 = {sign}((drop - c3 * c3 * p_qq) * inverse * inverse)", f"k3 = {sign}(-c3 * c4 * p_qt * inverse)")
+    add(3, f"k2, k3 = {sign}(drop - c3 * c3 * p_qq), {sign}(-c3 * c4 * p_qt)")
+    # B/q, not 1/q: a denormal q has no finite reciprocal, and the square of 1/q leaves the range long before
+    add(3, "if q > 0.0:", f"    {row('b')} = {', '.join(f'b{i} / q' for i in n)}")
     add(3, f"{row('u')} = {', '.join(f'k2 * b{i}' + (' + k3' if i < 3 else '') for i in n)}")
     add(3, f"{row('d')} = {', '.join(f'k3 * b{i}' + (' + k1' if i < 3 else '') for i in n)}")
     stiff = "stiff" if terms > 0 and single else "t"

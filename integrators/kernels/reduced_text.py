@@ -239,7 +239,8 @@ class _Text:
         add(depth, f"cross = {' + '.join(cross) or '0.0'}", "drop = c[3] * c[3] * slip", "k2, k3 = 0.0, 0.0")
         add(depth, f"k0, k1 = {sign}(c[0] - drop), {sign}(c[1] + drop / 3.0 - ball)")
         add(depth, "if q > 0.0:")
-        add(depth + 1, f"k2 = {sign}((drop - c[3] * c[3] * f[{first}]) / q / q)", f"k3 = {sign}(-c[3] * cross / q)")
+        add(depth + 1, f"k2, k3 = {sign}(drop - c[3] * c[3] * f[{first}]), {sign}(-c[3] * cross)")
+        add(depth + 1, f"{', '.join(f'b{i}' for i in n)} = {', '.join(f'b{i} / q' for i in n)}")
         add(
             depth,
             f"{', '.join(f'u{i}' for i in n)} = {', '.join(f'k2 * b{i}' + (' + k3' if i < 3 else '') for i in n)}",
