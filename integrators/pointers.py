@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import InputError
 from .kernel_types import no_law, no_method
 from .kernels import step_kernel, terms_kernel
 from .plan import KIND, LINES, METHOD_START, METRIC, ORDERS, SURFACES, UNKNOWNS
@@ -20,6 +21,9 @@ from .reduced_single import single_method
 __all__ = ["StepPointers", "step_pointers"]
 
 Array = NDArray[np.float64]
+RANGE = (
+    1e150  # of the moduli of a curved projection, and its reciprocal: their squares stay in the range of the exponent
+)
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class StepPointers:
     plan: NDArray[np.int64]
     numbers: Callable[..., Any]
     faces: bool
+    curved: bool = False
     memory: dict[bytes, Array] = field(default_factory=dict)
 
     def run(
@@ -68,9 +73,21 @@ class StepPointers:
             entries = self.numbers(values, time, heat)
         rows = np.array(np.broadcast_arrays(*entries), dtype=float)
         rows = np.ascontiguousarray(rows.reshape(len(entries), -1).T)
+        if self.curved:
+            self._check_range(rows)
         if self.faces:
             return np.array([np.concatenate([row, self._table(row)]) for row in rows])
         return rows
+
+    def _check_range(self, rows: Array) -> None:
+        n, start = int(self.plan[UNKNOWNS]), int(self.plan[METRIC])
+        moduli = np.abs(rows[:, start : start + n * n])
+        moduli = moduli[moduli > 0.0]
+        if moduli.size and not (moduli.min() >= 1.0 / RANGE and moduli.max() <= RANGE):
+            raise InputError(
+                f"moduli of the step from {moduli.min():.0e} to {moduli.max():.0e}: their squares leave the range of the exponent; "
+                "give stresses in another unit"
+            )
 
     def _table(self, row: Array) -> Array:
         n, surfaces, orders, start, metric = (int(self.plan[i]) for i in (UNKNOWNS, SURFACES, ORDERS, LINES, METRIC))
@@ -99,4 +116,4 @@ def step_pointers(module: ModuleType, precision: str = "float64") -> StepPointer
         chosen = affine_method(int(plan[UNKNOWNS]), int(plan[SURFACES] + plan[ORDERS]))
         return StepPointers(step, chosen, no_law(), rest, plan, module.coefficients_, True)
     chosen = single_method(plan) if method.endswith("single") else projection_method(plan)
-    return StepPointers(step, chosen, module.functions_, rest, plan, module.coefficients_, False)
+    return StepPointers(step, chosen, module.functions_, rest, plan, module.coefficients_, False, True)
