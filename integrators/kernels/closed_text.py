@@ -114,9 +114,9 @@ def closed_text(size: int, plan: Sequence[int], single: bool) -> str:
     force = "force" if terms > 0 and single else "s"
     add(2, f"{', '.join(f'{force}[{i}]' for i in n)} = {row('s')}")
     add(2, "if want:")
-    add(3, "drop = c3 * w", f"k0 = {sign}(c7 - drop)", f"k1 = {sign}(c8 + drop * THIRD - c4 * c4 * p_tt)")
-    add(3, f"k2, k3 = {sign}(drop - c3 * c3 * p_qq), {sign}(-c3 * c4 * p_qt)")
-    # B/q, not 1/q: a denormal q has no finite reciprocal, and the square of 1/q leaves the range long before
+    add(3, "drop = c3 * w", f"k0 = {sign}(c7 - drop)", f"k1 = {sign}(c8 + drop * THIRD - c4 * (c4 * p_tt))")
+    add(3, f"k2, k3 = {sign}(drop - c3 * (c3 * p_qq)), {sign}(-c3 * (c4 * p_qt))")
+    # B/q, not 1/q: a denormal q has no finite reciprocal; no product of two moduli: it may leave the range of the exponent
     add(3, "if q > 0.0:", f"    {row('b')} = {', '.join(f'b{i} / q' for i in n)}")
     add(3, f"{row('u')} = {', '.join(f'k2 * b{i}' + (' + k3' if i < 3 else '') for i in n)}")
     add(3, f"{row('d')} = {', '.join(f'k3 * b{i}' + (' + k1' if i < 3 else '') for i in n)}")

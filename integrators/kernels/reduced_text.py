@@ -228,7 +228,7 @@ class _Text:
         slopes = [f"c[{self.trace_start(i)}]" for i in range(self.traces)]
         cross = [f"{g} * f[{first + count * (self.norm + i)}]" for i, g in enumerate(slopes)] if self.norm else []
         ball = [
-            f"{g} * {h} * f[{first + count * (self.norm + i) + self.norm + j}]"
+            f"{g} * ({h} * f[{first + count * (self.norm + i) + self.norm + j}])"
             for i, g in enumerate(slopes)
             for j, h in enumerate(slopes)
         ]
@@ -236,10 +236,10 @@ class _Text:
         if not self.norm:
             self._isotropic(depth, stiff, f"{sign}c[0]", f"{sign}(c[1] - ball)")
             return
-        add(depth, f"cross = {' + '.join(cross) or '0.0'}", "drop = c[3] * c[3] * slip", "k2, k3 = 0.0, 0.0")
+        add(depth, f"cross = {' + '.join(cross) or '0.0'}", "drop = c[3] * (c[3] * slip)", "k2, k3 = 0.0, 0.0")
         add(depth, f"k0, k1 = {sign}(c[0] - drop), {sign}(c[1] + drop / 3.0 - ball)")
         add(depth, "if q > 0.0:")
-        add(depth + 1, f"k2, k3 = {sign}(drop - c[3] * c[3] * f[{first}]), {sign}(-c[3] * cross)")
+        add(depth + 1, f"k2, k3 = {sign}(drop - c[3] * (c[3] * f[{first}])), {sign}(-c[3] * cross)")
         add(depth + 1, f"{', '.join(f'b{i}' for i in n)} = {', '.join(f'b{i} / q' for i in n)}")
         add(
             depth,
@@ -274,16 +274,19 @@ class _Text:
         for k in range(3):
             add(depth, *(f"p{k}{l} = f[{first + count * k + l}]" for l in range(k, 3)))
         add(depth, *(f"z{k} = {' + '.join(names[k, l] for l in range(3))}" for k in range(3)))
-        add(depth, "total = g_1 * g_1 * (z0 + z1 + z2)", "w = g_0 * g_1", "g_0 *= g_0")
+        add(depth, "total = g_1 * (g_1 * (z0 + z1 + z2))")
         for k, l in pairs:
             add(
                 depth,
                 f"q{k}{l} = theta(a[{k}], a[{l}], f{k}, f{l}, {names[k, k]}, {names[l, l]}, {names[k, l]}, size_of(a), most)",
             )
         for k in range(3):
-            add(depth, *(f"{names[k, l]} = g_0 * {names[k, l]} + w * (z{k} + z{l}) + total" for l in range(k, 3)))
+            add(
+                depth,
+                *(f"{names[k, l]} = g_0 * (g_0 * {names[k, l]} + g_1 * (z{k} + z{l})) + total" for l in range(k, 3)),
+            )
         for k, l in pairs:
-            add(depth, f"q{k}{l} *= g_0")
+            add(depth, f"q{k}{l} = g_0 * (g_0 * q{k}{l})")
             for i, place in enumerate(COMPONENTS[size]):
                 r, s = ROWS[place]
                 body = f"ROOT * v{k}{r} * v{l}{r}" if r == s else f"v{k}{r} * v{l}{s} + v{k}{s} * v{l}{r}"
