@@ -85,7 +85,7 @@ class StepPointers:
         moduli = moduli[moduli > 0.0]
         if moduli.size and not (moduli.min() >= 1.0 / RANGE and moduli.max() <= RANGE):
             raise InputError(
-                f"moduli of the step from {moduli.min():.0e} to {moduli.max():.0e}: their squares leave the range of the exponent; "
+                f"moduli of the step from {moduli.min():.0e} to {moduli.max():.0e}: their products leave the range of the exponent; "
                 "give stresses in another unit"
             )
 
