@@ -260,9 +260,14 @@ class Integration:
             status[open_[(h[open_] < SMALLEST) & ~good]] = int(Status.ITERATION_LIMIT)
         if status.any():
             row = int(np.flatnonzero(status)[0])
+            reason = (
+                f"it needs more than {self.update.limit} sub-steps (a step of many relaxation times)"
+                if limit > self.update.limit
+                else "its sub-steps became too short (a vertex, or a tolerance out of reach)"
+            )
             raise ConvergenceError(
                 f"the explicit step fails at {int((status != 0).sum())} of {count} points, first {row}, strain {self.goal[row]}: "
-                "its sub-steps became too short (a vertex, or a tolerance out of reach); use solver='auto'"
+                f"{reason}; use solver='auto'"
             )
         stress = self.stress(self.goal, x)
         packed = np.concatenate([x, self.goal], axis=1)
