@@ -16,5 +16,6 @@ def test_cell(cell: Cell) -> None:
     assert row.verdict == "right" or len(row.message) > 20
 
 
-def test_names_are_unique() -> None:
+def test_few_cells_may_be_refused() -> None:
     assert len({cell.name for cell in CELLS}) == len(CELLS)
+    assert sum(bool(cell.says) for cell in CELLS) <= len(CELLS) / 10

@@ -69,6 +69,12 @@ def _between(found: Identification) -> str:
 def _yield(found: Identification) -> list[str]:
     """What the joint fit made of friction and cohesion, where it cannot be taken at its word."""
     out = []
+    hard = found.pooled.hardening
+    if hard is not None and not hard.yield_separable:
+        return [
+            f"θ_f, C_0 and H_eff are not separable by these tests (condition number {hard.yield_condition:.2g}): none has an interval. "
+            "Test at pressures that lie farther apart, or reverse the strain until plastic flow in extension resumes."
+        ]
     theta, cohesion = found.estimates.get("theta_f"), found.estimates.get("C_0")
     if theta is not None and theta.low is not None and theta.low <= 0.0 < theta.value:
         out.append(
@@ -86,6 +92,8 @@ def _hardening(found: Identification) -> list[str]:
     hard = found.pooled.hardening
     assert hard is not None
     limit = found.options.condition_limit
+    if not hard.separable and not hard.yield_separable:
+        return [f"Nor are H_k and H_i (condition number {hard.joint.condition:.2g} > {limit:g})."]
     if not hard.separable:
         return [
             f"H_k and H_i are not separable by these tests (condition number {hard.joint.condition:.2g} > {limit:g}): only "

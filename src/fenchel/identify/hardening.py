@@ -12,6 +12,11 @@ On a monotonic leg the law feels H_k and H_i only through H_eff = H_k(½ + t²/3
 parallel (ratio ½ + t²/3). A reversal that reaches plastic flow in extension parts them. The condition number of these two
 raw columns at the fitted point decides: above the limit one number is fitted, H_eff (carried by H_k alone, H_i = 0), and
 the two are marked as not separable.
+
+At one pressure, on one leg, P_s = P + √J₂/√3 makes (1, P_s, p) linearly dependent: only pressures that differ, or a reversal, part
+friction from cohesion and hardening. The condition number of the columns of (t, C_0, H_i), each of length one, says by how much the
+scatter of the data is blown up; some per cent of it times `YIELD_LIMIT` is all there is. Beyond, C_0 ends at its bound in every replica,
+and the others would have narrow intervals around wrong values: none has one.
 """
 
 from __future__ import annotations
@@ -34,6 +39,7 @@ from .yielding import YieldFit, effective_hardening
 __all__ = ["HardeningFit", "Stage", "fit_hardening", "misfit_of", "sensitivity"]
 
 Array = NDArray[np.float64]
+YIELD_LIMIT = 30.0  # of the condition number of the unit columns of (t, C_0, H_i)
 MAX_SLOPE = 1.6  # t above this leaves almost no yield in triaxial compression (none at √3)
 
 
@@ -61,11 +67,17 @@ class HardeningFit:
     names: tuple[str, ...]  # columns of the sensitivity matrix
     singular_values: tuple[float, ...]  # of the raw columns, all tests stacked
     hardening_singular_values: tuple[float, ...]  # of the block (H_k, H_i)
+    yield_condition: float  # of the columns of (t, C_0, H_i), each of length one
 
     @property
     def separable(self) -> bool:
         """Whether H_k and H_i are told apart by the data."""
         return self.joint.separable
+
+    @property
+    def yield_separable(self) -> bool:
+        """Whether friction, cohesion and hardening are told apart by the data."""
+        return self.yield_condition <= YIELD_LIMIT
 
 
 def _with(base: LawParameters, **changes: float) -> LawParameters:
@@ -220,6 +232,15 @@ def _fit(
     return unpack(y * units), tuple(name for name, value in zip(names, y, strict=True) if value == 0.0)
 
 
+def _unit_condition(columns: Array) -> float:
+    """Condition number of columns divided by their lengths; infinite where one vanishes."""
+    lengths = np.linalg.norm(columns, axis=0)
+    if not (lengths > 0.0).all():
+        return float("inf")
+    singular = np.linalg.svd(columns / lengths, compute_uv=False)
+    return float(singular[0] / singular[-1]) if singular[-1] > 0.0 else float("inf")
+
+
 def fit_hardening(
     tests: Sequence[Curves],
     elastic: ElasticFit,
@@ -288,4 +309,5 @@ def fit_hardening(
         names=names,
         singular_values=tuple(float(v) for v in np.linalg.svd(matrix, compute_uv=False)),
         hardening_singular_values=tuple(float(v) for v in np.linalg.svd(matrix[:, 2:], compute_uv=False)),
+        yield_condition=_unit_condition(matrix[:, [0, 1, 3]]),
     )

@@ -25,6 +25,7 @@ from .replay import Simulate, replay
 __all__ = ["Control", "Identification", "identify_law"]
 
 OCTANTS = 8
+ENTANGLED = "friction, cohesion and hardening not separable"
 REPLICA_FRAMES = 100  # per test: a coarser path shifts all octant replicas alike, not their spread
 
 
@@ -116,7 +117,7 @@ def _estimates(
     lower: float | None = 0.0,
 ) -> dict[str, Estimate]:
     nan = float("nan")
-    return {
+    out = {
         name: estimate(
             name,
             UNITS[name.split("@")[0]],
@@ -129,6 +130,8 @@ def _estimates(
         )
         for name, value in pooled.items()
     }
+    # one of them held at its bound in every replica would leave the others a narrow interval around a wrong value
+    return {name: replace(e, low=nan, high=nan, source="none") if e.note == ENTANGLED else e for name, e in out.items()}
 
 
 def _notes(fit: LawFit) -> dict[str, str]:
@@ -148,6 +151,8 @@ def _notes(fit: LawFit) -> dict[str, str]:
         for suffix, stage in (("_staged", fit.hardening.staged), ("", fit.hardening.joint)):
             for name in stage.at_bound:
                 notes[f"{name}{suffix}"] = "at its lower bound"
+            if not fit.hardening.yield_separable:
+                notes |= {f"{name}{suffix}": ENTANGLED for name in ("theta_f", "C_0", "H_eff", "H_k", "H_i")}
             if not stage.separable:
                 notes[f"H_k{suffix}"] = notes[f"H_i{suffix}"] = "not separable"
     line = fit.yielding.study_least_absolute
