@@ -36,7 +36,7 @@ def read_fclib(path: Path | str) -> OneStepProblem:
             return _read(file)
     except InputError as fault:
         raise InputError(f"{path}: {fault}") from None
-    except (OSError, RuntimeError, KeyError, TypeError, ValueError) as fault:
+    except (OSError, RuntimeError, LookupError, TypeError, ValueError, ArithmeticError, AttributeError) as fault:
         reason = " ".join(str(fault).split())[:160]
         raise InputError(f"{path}: not readable as an FCLIB file (HDF5): {reason}") from None
 
@@ -92,7 +92,7 @@ def _read(file: h5py.File) -> OneStepProblem:
             f"no problem that fenchel solves: {found}; 3D Coulomb friction (fclib_local, fclib_global) is read"
         )
     root = file[roots[0]]
-    dimension = int(np.ravel(_data(root, "spacedim"))[0])
+    dimension = _integer(root, "spacedim")
     if dimension != 3:
         kind = {2: "a plane problem (two rows a contact)", 5: "a rolling-friction problem (five rows a contact)"}
         raise InputError(
@@ -127,6 +127,13 @@ def _data(group: Any, name: str) -> np.ndarray:
     return value
 
 
+def _integer(group: Any, name: str) -> int:
+    value = _data(group, name).ravel()
+    if not value.size:
+        raise InputError(f"{group.name.strip('/')}/{name} is empty")
+    return int(value[0])
+
+
 def _vector(group: Any, name: str) -> np.ndarray:
     return _data(group, name).astype(float).ravel()
 
@@ -146,10 +153,10 @@ def _matrix(root: Any, name: str, rows: int, columns: int) -> sp.csr_matrix:
     if name not in root:
         raise InputError(f"{root.name.strip('/')}/{name} is missing")
     node = root[name]
-    given = tuple(int(np.ravel(_data(node, key))[0]) for key in ("m", "n"))
+    given = (_integer(node, "m"), _integer(node, "n"))
     if given != (rows, columns):
         raise InputError(f"{name} is {given[0]} x {given[1]}, the vectors beside it ask for {rows} x {columns}")
-    kind = int(np.ravel(_data(node, "nz"))[0])
+    kind = _integer(node, "nz")
     p, i = (_data(node, key).ravel().astype(np.int64) for key in ("p", "i"))
     x = _data(node, "x").astype(float).ravel()
     if kind >= 0:

@@ -101,7 +101,9 @@ def solve(
         monitor = Monitor(problem, blocks, tolerance, time_limit)
         monitor(blocks.unknowns(_given(start, n)))
         if not monitor.converged:
-            proof = SOLVERS[solver][1](blocks, monitor)
+            # iterates may leave the range of numbers; what is returned is the best that was measured
+            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+                proof = SOLVERS[solver][1](blocks, monitor)
         r, sweeps, factorisations = blocks.reactions(monitor.best), monitor.sweeps, monitor.factorisations
     seconds = time.thread_time() - began
     errors = measure(problem, r)
