@@ -74,7 +74,7 @@ def solve_anderson(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, 
             return
         f = (g - x).ravel()
         length = float(np.linalg.norm(f))
-        if length == 0.0:
+        if length == 0.0 or not np.isfinite(length):
             return
         if length > 2.0 * least:
             kept, least = 0, length
@@ -90,6 +90,8 @@ def solve_anderson(blocks: Blocks, monitor: Monitor, *, limit: int = 1_000_000, 
         if used:
             basis = increments[:, :used]
             gram = basis.T @ basis
+            if not np.isfinite(gram).all():
+                return  # the sweeps diverge and the iterates leave the range of numbers: nothing to accelerate
             gram[np.diag_indices(used)] *= 1.0 + 1e-12
             weight = np.linalg.lstsq(gram, basis.T @ f, rcond=1e-14)[0]
             x = (last_g - images[:, :used] @ weight).reshape(g.shape)

@@ -310,8 +310,8 @@ def finite(value: Any, at: str = "") -> list[str]:
     return []
 
 
-# what has no value: masses and radii of fixed bodies, the slope of a heap too small to have one, κ of rigid grains
-MAY_BE_INFINITE = ("mass", "angle", "reach", "height", "low", "kappa", "deflection", "start_half", "inertia")
+# what has no value: the half width of no box, masses and radii of fixed bodies, the slope of a heap too small to have one, κ of rigid grains
+MAY_BE_INFINITE = ("half", "mass", "angle", "reach", "height", "low", "kappa", "deflection", "start_half", "inertia")
 
 
 def judge_run(case: dict[str, Any], run: Path) -> None:
