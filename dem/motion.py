@@ -154,7 +154,11 @@ def run_motion(
     `StorageError` when the file cannot be written.
     """
     scene = check_motion_scene(scene_file) if isinstance(scene_file, MotionScene) else read_motion_scene(scene_file)
-    settings = {"scene": msgspec.to_builtins(scene)}
+    from .accuracy import resolved
+
+    chosen, choice = resolved(scene, run_file)
+    assert isinstance(chosen, MotionScene)
+    settings = {"scene": msgspec.to_builtins(scene), **choice}
     if Path(run_file).exists() and not resume:
         raise InputError(f"{run_file}: exists already; say --resume to go on with it, or choose another name")
 
@@ -168,7 +172,7 @@ def run_motion(
         }
 
     return run_stages(
-        [lambda assembly: MotionStage(assembly, scene)],
+        [lambda assembly: MotionStage(assembly, chosen)],
         lambda: bodies_of(scene),
         run_file,
         settings,

@@ -17,7 +17,7 @@ from .bodies import Assembly
 from .laws import CONTACT_LAWS, CompliantSignoriniCoulomb, ContactLaw, NewtonRestitution, Signorini, SignoriniCoulomb
 from .materials import Laws, Material
 from .planes import Plane
-from .scene import Name, check_finite, key_meta, read_toml
+from .scene import Name, check_accuracy, check_finite, key_meta, read_toml
 from .shapes import chain, hexagonal_floor, lattice
 
 __all__ = ["MotionScene", "bodies_of", "is_motion", "laws_of", "planes_of", "read_motion_scene"]
@@ -151,6 +151,10 @@ class MotionScene(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fiel
     contact: Annotated[ContactKeys, _key("the contact law", "–")] = ContactKeys()
     wire: Annotated[WireKeys, _key("the law of the links of chains", "–")] = WireKeys()
     solve: Annotated[MotionSolve, _key("the solver", "–")] = MotionSolve()
+    accuracy: Annotated[
+        Annotated[float, msgspec.Meta(gt=0, lt=1)] | None,
+        _key("relative error wanted of the centre of mass: chooses step and tolerance from a measured front", "1"),
+    ] = None
 
 
 def is_motion(path: Path | str) -> bool:
@@ -170,6 +174,7 @@ def check_motion_scene(scene: MotionScene, name: str = "scene") -> MotionScene:
     """Rules that reach across keys; raises `InputError`, returns the scene."""
     d = scene.dimension
     check_finite(scene, name)
+    check_accuracy(scene, name)
     vectors = {"motion.gravity": scene.motion.gravity or (0.0,) * d}
     if scene.grains is not None:
         vectors |= {"grains.low": scene.grains.low, "grains.high": scene.grains.high}

@@ -189,11 +189,15 @@ def run_scene(
     `InputError` for a bad scene or run file, `ConvergenceError` for an unconverged step, `StorageError` when the file cannot be written.
     """
     scene = scene_file if isinstance(scene_file, Scene) else read_scene(scene_file)
-    settings = {"scene": msgspec.to_builtins(scene)}
+    from .accuracy import resolved
+
+    chosen, choice = resolved(scene, run_file)
+    assert isinstance(chosen, Scene)
+    settings = {"scene": msgspec.to_builtins(scene), **choice}
     if Path(run_file).exists() and not resume:
         raise InputError(f"{run_file}: exists already; say --resume to go on with it, or choose another name")
     content = run_stages(
-        _stages(scene),
+        _stages(scene, chosen.solve),
         lambda: make_sample(scene.grains, scene.wires, scene.sample, scene.seed),
         run_file,
         settings,
@@ -242,15 +246,15 @@ def triaxial_stage(
     )
 
 
-def _stages(scene: Scene) -> list[Callable[[Assembly], Stage]]:
-    """Makers of the stages of a scene: a stage is made when its turn comes, from the assembly as it is then."""
+def _stages(scene: Scene, solve: SceneSolve) -> list[Callable[[Assembly], Stage]]:
+    """Makers of the stages of a scene, `solve` for its test: a stage is made when its turn comes, from the assembly as it is then."""
     pressure = scene.triaxial.pressure
     test = partial(
         triaxial_stage,
         grains=scene.grains,
         wires=scene.wires,
         path=scene.triaxial,
-        solve=scene.solve,
+        solve=solve,
         pressure=pressure,
     )
     return [*preparation(scene.grains, scene.wires, scene.sample, scene.solve, pressure), test]

@@ -125,6 +125,12 @@ class Scene(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_fields=Tru
     sample: Annotated[Sample, _key("the preparation", "–")] = Sample()
     triaxial: Annotated[SceneTriaxial, _key("the test", "–")] = SceneTriaxial()
     solve: Annotated[SceneSolve, _key("the solver", "–")] = SceneSolve()
+    accuracy: Annotated[
+        Annotated[float, msgspec.Meta(gt=0, lt=1)] | None,
+        _key(
+            "relative error wanted of the deviator: chooses step and tolerance of the test from what was measured", "1"
+        ),
+    ] = None
 
 
 Kind = TypeVar("Kind")
@@ -280,9 +286,20 @@ def check_sphere(count: int, sphere: float, path: tuple[float, ...], name: str) 
         )
 
 
+def check_accuracy(scene: Any, name: str) -> None:
+    """`accuracy` chooses what `solve` would say."""
+    if scene.accuracy is None:
+        return
+    for key in ("tolerance", "step"):
+        default = {f.name: f.default for f in msgspec.structs.fields(type(scene.solve))}.get(key)
+        if default is not None and getattr(scene.solve, key) != default:
+            raise InputError(f"{name}: accuracy chooses solve.{key}: leave one of them out")
+
+
 def check_scene(scene: Scene, name: str = "scene") -> Scene:
     """Rules that reach across keys; raises `InputError`, returns the scene."""
     check_finite(scene, name)
+    check_accuracy(scene, name)
     check_bodies(scene.grains, scene.wires, scene.sample, name)
     check_pressure(scene.triaxial.pressure, "triaxial.pressure", name)
     check_soft(scene.grains, scene.triaxial.pressure, "triaxial.pressure", name)

@@ -15,10 +15,20 @@ from .materials import Material
 from .measures import Repose
 from .run import Progress, Stage, run_stages
 from .samples import LogNormal, Sieve, Sizes, UniformByNumber, UniformByVolume, random_sample
-from .scene import Name, check_finite, key_meta, read_toml
+from .scene import Name, check_accuracy, check_finite, key_meta, read_toml
 from .slope import SlopeDeposit, slope_start
 
-__all__ = ["QUALITY", "SlopeScene", "is_slope", "read_slope_scene", "run_slope"]
+__all__ = [
+    "QUALITY",
+    "SlopeScene",
+    "deposit_of",
+    "is_slope",
+    "quality_of",
+    "read_slope_scene",
+    "repose_of",
+    "run_slope",
+    "start_of",
+]
 
 _key = key_meta
 
@@ -109,6 +119,10 @@ class SlopeScene(msgspec.Struct, frozen=True, kw_only=True, forbid_unknown_field
     grains: Annotated[SlopeGrains, _key("the grains", "–")] = SlopeGrains()
     wires: Annotated[SlopeWires | None, _key("the wires; leave out for sand alone", "–")] = None
     solve: Annotated[SlopeSolve, _key("the solver", "–")] = SlopeSolve()
+    accuracy: Annotated[
+        Annotated[float, msgspec.Meta(gt=0, lt=1)] | None,
+        _key("relative error wanted of the angle: chooses the tolerance from a measured front", "1"),
+    ] = None
 
 
 def is_slope(path: Path | str) -> bool:
@@ -127,6 +141,7 @@ def read_slope_scene(path: Path | str) -> SlopeScene:
 def check_slope_scene(scene: SlopeScene, name: str = "scene") -> SlopeScene:
     """Rules that reach across keys; raises `InputError`, returns the scene."""
     check_finite(scene, name)
+    check_accuracy(scene, name)
     grains, wires = scene.grains, scene.wires
     wanted = {
         "number": ("radius",),
@@ -163,7 +178,8 @@ def sizes_of(grains: SlopeGrains) -> Sizes:
     return kind(small=grains.radius[0], large=grains.radius[1])
 
 
-def _start(scene: SlopeScene) -> Assembly:
+def start_of(scene: SlopeScene) -> Assembly:
+    """The block above its floor."""
     g, w = scene.grains, scene.wires
     chains: dict[str, Any] = {}
     if w is not None:
@@ -182,7 +198,8 @@ def _start(scene: SlopeScene) -> Assembly:
     return slope_start(block, density=g.density, reach=scene.slope.reach)
 
 
-def _deposit(scene: SlopeScene, assembly: Assembly) -> SlopeDeposit:
+def deposit_of(scene: SlopeScene, assembly: Assembly) -> SlopeDeposit:
+    """The deposit of a block."""
     g, w, s = scene.grains, scene.wires, scene.slope
     law = Material(friction=g.friction, bead_friction=g.friction, links=False)
     if w is not None:
@@ -213,37 +230,27 @@ def run_slope(
     heap that does not come to rest, `StorageError` when the file cannot be written.
     """
     scene = check_slope_scene(scene_file) if isinstance(scene_file, SlopeScene) else read_slope_scene(scene_file)
-    settings = {"scene": msgspec.to_builtins(scene)}
+    from .accuracy import resolved
+
+    chosen, choice = resolved(scene, run_file)
+    assert isinstance(chosen, SlopeScene)
+    settings = {"scene": msgspec.to_builtins(scene), **choice}
     if Path(run_file).exists() and not resume:
         raise InputError(f"{run_file}: exists already; say --resume to go on with it, or choose another name")
 
     def finish(assembly: Assembly, stage: Stage) -> dict[str, Any]:
         assert isinstance(stage, SlopeDeposit)
-        try:
-            found = stage.repose(azimuths=scene.slope.azimuths)
-        except InputError:
-            # too few bodies on the surface: the deposit is there all the same, only its angle is not
-            none = np.zeros(0)
-            found = Repose(
-                angle=np.nan,
-                low=np.nan,
-                high=np.nan,
-                angles=none,
-                height=np.nan,
-                reach=np.nan,
-                distance=none,
-                profile=none,
-            )
+        found = repose_of(stage, scene)
         return {
-            "quality": _quality(stage, found),
+            "quality": quality_of(stage, found),
             "profile": {"distance": found.distance, "height": found.profile, "angles": found.angles},
             "kernels": stage.simulation.kernels.report(),
             "assembly": assembly.arrays(),
         }
 
     return run_stages(
-        [lambda assembly: _deposit(scene, assembly)],
-        lambda: _start(scene),
+        [lambda assembly: deposit_of(chosen, assembly)],
+        lambda: start_of(scene),
         run_file,
         settings,
         finish,
@@ -252,7 +259,26 @@ def run_slope(
     )
 
 
-def _quality(stage: SlopeDeposit, found: Repose) -> dict[str, float]:
+def repose_of(stage: SlopeDeposit, scene: SlopeScene) -> Repose:
+    """The slope of a heap; nan of one with too few bodies on its surface: the deposit is there all the same, only its angle is not."""
+    try:
+        return stage.repose(azimuths=scene.slope.azimuths)
+    except InputError:
+        none = np.zeros(0)
+        return Repose(
+            angle=np.nan,
+            low=np.nan,
+            high=np.nan,
+            angles=none,
+            height=np.nan,
+            reach=np.nan,
+            distance=none,
+            profile=none,
+        )
+
+
+def quality_of(stage: SlopeDeposit, found: Repose) -> dict[str, float]:
+    """What `QUALITY` names."""
     moving = int(np.isfinite(stage.assembly.mass).sum())
     return {
         "angle": found.angle,

@@ -217,7 +217,9 @@ def _dual(shown: Any, kind: int) -> Array:
     return np.array([x, y, z])
 
 
-def reference(step: GeneralStep, eps: Array, old: Array, temperature: Array | None) -> StepSolution:
+def reference(
+    step: GeneralStep, eps: Array, old: Array, temperature: Array | None, tolerance: float = 1e-8
+) -> StepSolution:
     """The step at every point through cvxpy and clarabel, as they leave it; slow, without tangent."""
     from .general_update import GeneralUpdate
 
@@ -228,7 +230,7 @@ def reference(step: GeneralStep, eps: Array, old: Array, temperature: Array | No
     for points, program, data in step.groups(eps, old, temperature):
         for row, i in enumerate(np.arange(n)[points]):
             given = declare(step.law, update, program, data[row : row + 1], eps[i : i + 1], old[i : i + 1])
-            y, multipliers, said = given.unpolished()
+            y, multipliers, said = given.unpolished(tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance)
             if y is None or multipliers is None:
                 status[i] = Status.INFEASIBLE if "infeasible" in said else Status.ITERATION_LIMIT
                 continue

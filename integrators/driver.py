@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..potentials import Law
+from .accuracy import AccurateUpdate
 from .explicit import ExplicitUpdate
 from .general_update import GeneralUpdate
 from .history import History, drive_arrays
@@ -21,7 +22,7 @@ __all__ = ["drive"]
 
 
 def drive(
-    law: Law | Update | GeneralUpdate | StressUpdate | ExplicitUpdate,
+    law: Law | Update | GeneralUpdate | StressUpdate | ExplicitUpdate | AccurateUpdate,
     path: StrainStressPath | str | Path,
     values: Mapping[str, Any],
     initial_state: Mapping[str, Any] | None = None,
@@ -35,7 +36,7 @@ def drive(
     Raises `InputError` for bad input, `ConvergenceError` with the row where the path cannot be followed.
     """
     plan = path if isinstance(path, StrainStressPath) else read_path(path)
-    compiled = isinstance(law, (Update, GeneralUpdate, StressUpdate, ExplicitUpdate))
+    compiled = isinstance(law, (Update, GeneralUpdate, StressUpdate, ExplicitUpdate, AccurateUpdate))
     update = law if compiled else build_update(law, solver=solver, formulation=formulation)
     return drive_arrays(
         update,

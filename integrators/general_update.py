@@ -20,7 +20,7 @@ from ..potentials.evaluate import evaluate
 from .declared import DeclaredStep, components, declared_step
 from .dimension import SPACE
 from .failures import raise_failures
-from .general_step import GeneralStep, StepSolution
+from .general_step import TOLERANCE, GeneralStep, StepSolution
 from .packing import StatePacking
 from .sensitivity import Sensitivities, sensitivities
 from .step_result import StepResult
@@ -31,12 +31,14 @@ __all__ = ["GeneralUpdate"]
 
 Array = NDArray[np.float64]
 KEPT = 8
+CLARABEL = 1e-8  # what clarabel asks of its gap and residuals by itself
 
 
 @dataclass(frozen=True)
 class GeneralUpdate:
     """`solver` is "general" (the engine), "conic" (clarabel polished by the engine) or "cvxpy" (neither polished nor fast); the engine
-    takes its points in `threads`, which does not change an answer.
+    takes its points in `threads`, which does not change an answer. `tolerance` of the residual relative to the data: of the engine, where
+    clarabel's answer is polished too, of clarabel itself under "cvxpy".
 
     Of the formulation "stress" the step takes stresses, with the strain among the unknowns of the program.
     """
@@ -49,6 +51,7 @@ class GeneralUpdate:
     why: str = ""
     formulation: str = "strain"
     threads: int = 1
+    tolerance: float = TOLERANCE
     _steps: dict[Any, GeneralStep] = field(default_factory=dict, compare=False, repr=False)
 
     @classmethod
@@ -60,11 +63,14 @@ class GeneralUpdate:
         why: str = "",
         formulation: str = "strain",
         threads: int = 1,
+        tolerance: float | None = None,
     ) -> GeneralUpdate:
         """Update of a law; refuses in one line a law with a term that has no conic form, as far as that shows before values are given."""
         checked_threads(threads)
         declared = declared_step(law, whole=solver != "general" or formulation == "stress")
-        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation, threads)
+        if tolerance is None:
+            tolerance = CLARABEL if solver == "cvxpy" else TOLERANCE
+        found = cls(law, StatePacking.of(law), declared, tangent, solver, why, formulation, threads, tolerance)
         found._rehearse()
         return found
 
@@ -173,9 +179,18 @@ class GeneralUpdate:
         if self.solver == "cvxpy":
             from .conic import reference
 
-            return reference(step, eps, old, temperature)
+            return reference(step, eps, old, temperature, self.tolerance)
         method = "conic" if self.solver == "conic" else "general"
-        return step.solve(eps, old, temperature, tangent=wanted, method=method, start=start, threads=self.threads)
+        return step.solve(
+            eps,
+            old,
+            temperature,
+            tangent=wanted,
+            method=method,
+            tolerance=self.tolerance,
+            start=start,
+            threads=self.threads,
+        )
 
     def outcome(self, eps: Array, old: Array, found: StepSolution) -> tuple[Array, Array]:
         """(packed new state, dissipation of the step [J/m³])."""

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from .accuracy import AccurateUpdate
 from .compiled_step import packed_values
 from .dimension import require_space
 from .explicit import ExplicitUpdate
@@ -57,7 +58,7 @@ class History:
 
 
 def drive_arrays(
-    update: Update | GeneralUpdate | StressUpdate | ExplicitUpdate,
+    update: Update | GeneralUpdate | StressUpdate | ExplicitUpdate | AccurateUpdate,
     control: Any,
     targets: Any,
     values: Mapping[str, Any],
@@ -80,6 +81,8 @@ def drive_arrays(
     messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
+    if isinstance(update, AccurateUpdate):
+        update = update.inner
     require_space(update, "drive")
     turned = _turned(update)
     plan = path_plan(control, targets, trace, trace_targets, turned)

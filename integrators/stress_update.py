@@ -108,7 +108,9 @@ class StressUpdate(CompiledStep):
         return found
 
 
-def build_stress_update(law: Law, solver: str = "auto", tangent: bool = True, threads: int = 1) -> Any:
+def build_stress_update(
+    law: Law, solver: str = "auto", tangent: bool = True, threads: int = 1, tolerance: float | None = None
+) -> Any:
     """The cheapest exact method for the step driven by the stress, or the one that is named; see `build_update`."""
     why = "asked for by name"
     if solver == "explicit":
@@ -122,7 +124,7 @@ def build_stress_update(law: Law, solver: str = "auto", tangent: bool = True, th
             why = f"no cheaper method: {reason}"
     from .general_update import GeneralUpdate
 
-    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why, "stress", threads)
+    return GeneralUpdate.of(law, tangent, "general" if solver == "auto" else solver, why, "stress", threads, tolerance)
 
 
 def _reduced(law: Law, solver: str, tangent: bool, threads: int) -> StressUpdate:

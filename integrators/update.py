@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -158,13 +158,21 @@ def build_update(
     tangent: bool = True,
     precision: str = "float64",
     threads: int = 1,
+    tolerance: float | None = None,
+    accuracy: float | None = None,
 ) -> Any:
     """Choose the cheapest exact method for the law: `closed`, else `reduced`, else `principal`, else `general` (any convex law); or take
     the one that is named. `.solver` and `.why` of what is returned say which and why.
 
     `dimension` is one of `DIMENSIONS`; `formulation` "strain" or "stress", what drives the step; with `precision` "float32" the arrays of
     generated steps are in single precision, their arithmetic stays double; `threads` share the points.
+
+    `tolerance` is for methods that iterate to one: of general and conic the residual relative to the data, of cvxpy clarabel's, of explicit
+    the error per sub-step relative to the stress. `accuracy` (relative error of the stress) chooses solver, tolerance and precision by what
+    was measured, and checks the answers; see `fenchel.integrators.accuracy`.
     """
+    if accuracy is not None:
+        return _accurate(law, dimension, formulation, solver, tangent, precision, threads, tolerance, accuracy)
     kinds = dimension_named(dimension)
     if formulation not in ("strain", "stress"):
         raise InputError(f"formulation {formulation!r} is not known; it is 'strain' or 'stress'")
@@ -175,6 +183,8 @@ def build_update(
     if precision not in ("float64", "float32"):
         raise InputError(f"precision {precision!r} is not known; it is float64 or float32")
     checked_threads(threads)
+    if tolerance is not None and not (np.isfinite(tolerance) and 1e-15 <= tolerance < 1.0):
+        raise InputError(f"tolerance = {tolerance:g}: it lies between 1e-15 and 1")
     if not isinstance(law, Law):
         raise DeclarationError(f"build_update takes a Law, not {type(law).__name__}")
     law.check_evolution()
@@ -183,7 +193,7 @@ def build_update(
 
         if precision != "float64":
             raise InputError("precision float32 is there for the strain formulation")
-        driven = build_stress_update(law, solver, tangent, threads)
+        driven = build_stress_update(law, solver, tangent, threads, tolerance)
         if kinds.name == "3d":
             return driven
         from .embedded import EmbeddedUpdate
@@ -195,6 +205,10 @@ def build_update(
             module = load_module(law, solver, kinds.size)
             layout, size = state_layout(law, kinds.size)
             method = module.METHOD.split()[0]
+            if tolerance is not None:
+                raise InputError(
+                    f"law '{law.name}': method '{method}' has no tolerance, its answers are exact to rounding: leave it out"
+                )
             return Update(law, module, tangent, method, layout, size, module.WHY, kinds, precision, threads)
         except NoReduction as reason:
             if solver != "auto":
@@ -207,15 +221,45 @@ def build_update(
     if solver == EXPLICIT:
         from .explicit import ExplicitUpdate
 
-        found: Any = ExplicitUpdate(law)
+        found: Any = ExplicitUpdate(law) if tolerance is None else ExplicitUpdate(law, tolerance)
     else:
         from .general_update import GeneralUpdate
 
         found = GeneralUpdate.of(
-            law, tangent or bool(kinds.relaxed), "general" if solver == "auto" else solver, why, threads=threads
+            law,
+            tangent or bool(kinds.relaxed),
+            "general" if solver == "auto" else solver,
+            why,
+            threads=threads,
+            tolerance=tolerance,
         )
     if kinds.name == "3d":
         return found
     from .embedded import EmbeddedUpdate
 
     return EmbeddedUpdate.of(found, kinds, tangent)
+
+
+def _accurate(
+    law: Law,
+    dimension: str,
+    formulation: str,
+    solver: str,
+    tangent: bool,
+    precision: str,
+    threads: int,
+    tolerance: float | None,
+    accuracy: float,
+) -> Any:
+    """The step with the setting that is known to be the cheapest one of that accuracy."""
+    from .accuracy import AccurateUpdate, choose
+
+    if solver != "auto" or precision != "float64" or tolerance is not None:
+        raise InputError("accuracy chooses solver, precision and tolerance: leave them out, or leave accuracy out")
+    build = partial(build_update, law, dimension, formulation=formulation, tangent=tangent, threads=threads)
+    exact = build()
+    choice = choose(law, exact.solver, dimension, formulation, accuracy)
+    setting = dict(choice.setting)
+    if setting == {"solver": exact.solver}:
+        return AccurateUpdate(exact, choice, exact)
+    return AccurateUpdate(build(**setting), choice, exact)

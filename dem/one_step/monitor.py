@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 from numpy.typing import NDArray
@@ -59,6 +61,16 @@ class Monitor:
     def time_left(self) -> float:
         """Seconds of this thread that are left."""
         return self._deadline - time.thread_time()
+
+    @contextmanager
+    def within(self, seconds: float) -> Iterator[None]:
+        """A shorter time limit for what is tried first; the old one counts again afterwards."""
+        before = self._deadline
+        self._deadline = min(before, time.thread_time() + seconds)
+        try:
+            yield
+        finally:
+            self._deadline = before
 
     def _judge(self, x: Array) -> float:
         """The larger of natural_map_q and natural_map_scaled, by compiled code."""

@@ -9,14 +9,15 @@ from __future__ import annotations
 
 from .admm import solve_admm
 from .blocks import Blocks
+from .choice import LEAST, PATIENCE, choose_solver, described, probe
 from .feasibility import Infeasibility, find_infeasibility
 from .gauss_seidel import solve_anderson, solve_nlgs
 from .homotopy import solve_homotopy
 from .interior import solve_interior, solve_interior_selective
 from .monitor import Monitor
-from .newton import polish
+from .newton import polish, solve_proximal_newton
 
-__all__ = ["solve_auto"]
+__all__ = ["solve_auto", "solve_measured"]
 
 _TINY = 80  # contacts up to which an interior point solution is cheaper than some hundred sweeps
 _SMALL = 1000  # contacts below which a factorisation costs milliseconds
@@ -58,6 +59,29 @@ def solve_auto(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
             return None
     solve_anderson(blocks, monitor)
     return None
+
+
+def solve_measured(blocks: Blocks, monitor: Monitor) -> Infeasibility | None:
+    """What was the fastest on problems like this one (`choice`); `auto` where that does not come to its end in good time."""
+    early, late = probe(blocks, monitor)
+    if _finished(monitor):
+        return None
+    choice = choose_solver(described(blocks, monitor.problem.mu, early, late), monitor.tolerance)
+    method = _METHODS.get(choice.solver)
+    if method is not None:
+        with monitor.within(max(PATIENCE * choice.seconds, LEAST)):
+            method(blocks, monitor)
+    return None if _finished(monitor) else solve_auto(blocks, monitor)
+
+
+_METHODS = {
+    "nlgs": solve_nlgs,
+    "anderson": solve_anderson,
+    "admm": solve_admm,
+    "interior": solve_interior,
+    "newton": solve_proximal_newton,
+    "homotopy": solve_homotopy,
+}
 
 
 def _finished(monitor: Monitor) -> bool:

@@ -10,7 +10,7 @@ import sys
 
 import typer
 
-from . import compare, contact, dem, doctor, drive, identify, laws, reproduce
+from . import compare, contact, dem, doctor, drive, identify, laws, reproduce, tradeoff
 from .faults import one_line
 
 __all__ = ["app", "main"]
@@ -44,7 +44,7 @@ def _face(
     """
 
 
-for _group in (laws, drive, compare, dem, contact, identify, reproduce, doctor):
+for _group in (laws, drive, compare, dem, contact, identify, reproduce, tradeoff, doctor):
     _group.register(app)
 
 

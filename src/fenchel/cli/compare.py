@@ -18,9 +18,10 @@ from .values import PARAMETERS, VALUES, parameter_values
 if TYPE_CHECKING:
     from fenchel.integrators import Comparison, Run
 
-__all__ = ["register"]
+__all__ = ["notice", "register"]
 
 _QUIET = 2.0  # s before anything is told
+_PACE = 5.0  # s between two lines where there is no terminal
 
 
 def register(app: typer.Typer) -> None:
@@ -56,7 +57,7 @@ def _compare(
     values = parameter_values(pairs, parameters)
     plan = turn_path(read_path(path), signs)
     declared = load_law(law)
-    with _notice() as told:
+    with notice() as told:
         found = compare(declared, plan, values, tolerance=tolerance, sampled_rows=sampled, progress=told)
     if output is not None:
         write_text(output, csv_text(_columns(found)))
@@ -166,14 +167,18 @@ def _short(value: float | None) -> str:
 
 
 @contextmanager
-def _notice() -> Iterator[Callable[[float, str], None]]:
-    """A function that tells what comes next, on standard error; silent for the first two seconds."""
+def notice() -> Iterator[Callable[[float, str], None]]:
+    """A function that tells what comes next, on standard error; silent for the first two seconds, a line now and then where there
+    is no terminal."""
     start, shown, terminal = time.monotonic(), False, sys.stderr.isatty()
+    last = -_PACE
 
     def tell(share: float, what: str) -> None:
-        nonlocal shown
-        if time.monotonic() - start < _QUIET:
+        nonlocal shown, last
+        now = time.monotonic()
+        if now - start < _QUIET or (not terminal and now - last < _PACE):
             return
+        last = now
         line = f"{share:4.0%}  {what}"
         if terminal:
             print(f"\r{line:<60}", end="", file=sys.stderr, flush=True)

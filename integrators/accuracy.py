@@ -1,0 +1,269 @@
+"""A step for a wanted accuracy: the cheapest setting that is known to meet it, and the check that it did.
+
+The accuracy is the error of the stress against the exact answer of the implicit step, relative to the largest stress of the call. (What
+the length of the step costs is another error, see `fenchel tradeoff law`.) Settings come from the front that `fenchel tradeoff law` kept
+for this law on this machine, else from those shipped for its method. With E the answer of the general engine, δ its duality gap and L the
+largest eigenvalue of ∂²ψ/∂ε²,
+
+    |σ − σ_exact| ≤ |σ − E| + √(2 L δ),
+
+since ½ (X − X*)·ψ_XX (X − X*) ≤ δ and ψ_εX ψ_XX⁻¹ ψ_Xε ≤ ψ_εε for convex ψ. In double precision the root ends at about 1e-8 of the stress;
+finer accuracies are confirmed by the residual of E's optimality conditions instead (`certificate.natural_map`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cache import content_hash
+from ..errors import ConvergenceError, FenchelError, InputError
+from ..front import Front, Measured, checked_accuracy, kept_front, shipped_front
+from ..potentials import Law
+from ..potentials.derivative import second_derivative
+from .certificate import natural_map, solution_gap
+from .dimension import SPACE
+from .general_update import GeneralUpdate
+from .packing import StatePacking
+from .step_result import StepResult
+from .strain_energy import operator_matrices
+from .thermal import thermal_input
+
+__all__ = ["AccurateUpdate", "Bound", "Choice", "choose", "error_bound", "law_key"]
+
+Array = NDArray[np.float64]
+SAMPLE = 8  # points of a call that are checked
+RESIDUAL = 1e-11  # of the trusted answer, where its gap is below what double precision can show
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The `setting` (solver, and tolerance or precision where it has one), the `expected` error, and in words where both come from."""
+
+    accuracy: float
+    setting: Mapping[str, Any]
+    expected: float
+    source: str
+    why: str
+
+    def __str__(self) -> str:
+        return self.why
+
+
+@dataclass(frozen=True)
+class Bound:
+    """Errors of the stress at checked points, relative: `difference` to the trusted answer, `gap` bound of the latter's own error (n,),
+    `residual` of its optimality conditions."""
+
+    difference: Array
+    gap: Array
+    residual: float
+
+    def confirms(self, accuracy: float) -> bool:
+        """True if no checked point errs more."""
+        total = float((self.difference + self.gap).max(initial=0.0))
+        if total <= accuracy:
+            return True
+        return self.residual <= RESIDUAL and float(self.difference.max(initial=0.0)) <= accuracy
+
+
+def law_key(law: Law, dimension: str, formulation: str = "strain") -> str:
+    """Key of a law's front in the user's cache."""
+    return content_hash(law.text, dimension, formulation)
+
+
+def choose(law: Law, solver: str, dimension: str, formulation: str, accuracy: float) -> Choice:
+    """The cheapest known setting; `solver` is the method that the law's structure gives. `InputError` where none is known to be so
+    accurate."""
+    accuracy = checked_accuracy(accuracy)
+    kept = kept_front("law", law_key(law, dimension, formulation))
+    if kept is not None:
+        front, source = kept, "the front measured on this machine for this law"
+    else:
+        front, source = _shipped(solver), f"the front shipped for method '{solver}'"
+    front = _usable(front, dimension, formulation)
+    point = front.cheapest(accuracy)
+    if point is None:
+        raise InputError(
+            f"law '{law.name}': accuracy = {accuracy:g}: the finest that is known for it is {front.finest:.1e} ({source}); ask for that"
+        )
+    return Choice(
+        accuracy, dict(point.setting), float(point.error or 0.0), source, _words(point, front, accuracy, source)
+    )
+
+
+def _shipped(solver: str) -> Front:
+    fronts = shipped_front("law")["methods"]
+    return Front.from_dict(fronts[solver if solver in fronts else "general"])
+
+
+def _usable(front: Front, dimension: str, formulation: str) -> Front:
+    """Without what cannot be compiled here, or has no tangent: nobody who asks for an accuracy means to lose it."""
+
+    def takes(setting: Mapping[str, Any]) -> bool:
+        if setting.get("precision") == "float32" and (formulation != "strain" or dimension != "3d"):
+            return False
+        return setting["solver"] not in ("cvxpy", "explicit")
+
+    return replace(front, points=tuple(p for p in front.points if takes(p.setting)))
+
+
+def _words(point: Measured, front: Front, accuracy: float, source: str) -> str:
+    others = [p for p in front.points if p is not point and p.error is not None and p.error <= accuracy]
+    beside = min(others, key=lambda p: p.cost, default=None)
+    text = f"{point.name}: error up to {point.error or 0.0:.0e}, asked {accuracy:g}; from {source}"
+    if beside is not None:
+        text += f"; next is {beside.name} at {beside.cost / point.cost:.2f} times its time"
+    return text
+
+
+# -- the check -----------------------------------------------------------------------------------------------------------------
+
+
+@dataclass
+class AccurateUpdate:
+    """A compiled step with the setting that was chosen for an accuracy; the same call as the step, and everything else that it has.
+
+    Calls 1, 2, 4, 8, … are checked at up to eight of their points, so that the checks of a long run cost next to nothing; `verify` checks a
+    call at will. Where a check fails the call is done again by the exact setting, and from then on so is every call: `.fallbacks` counts
+    them. `ConvergenceError` if that does not meet the accuracy either.
+    """
+
+    inner: Any
+    choice: Choice
+    exact: Any
+    calls: int = 0
+    checks: int = 0
+    fallbacks: int = 0
+    worst: float = 0.0  # largest error met in a check, relative
+    unchecked: str = ""  # why calls cannot be checked, if so
+    last: Bound | None = field(default=None, repr=False)
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__") or name == "inner":
+            raise AttributeError(name)
+        return getattr(self.inner, name)
+
+    @cached_property
+    def _trusted(self) -> GeneralUpdate | None:
+        try:
+            return GeneralUpdate.of(self.inner.law, False)
+        except FenchelError as problem:
+            self.unchecked = f"the step has no cone program to check it by: {problem}"
+            return None
+
+    def __call__(
+        self, driven: Any, state: Mapping[str, Any] | None = None, dt: float = 1.0, **values: Any
+    ) -> StepResult:
+        """See `Update.__call__`."""
+        out = self.inner(driven, state, dt, **values)
+        self.calls += 1
+        if self.calls & (self.calls - 1) or self._trusted is None or len(out.status) == 0:
+            return out
+        if self._accepts(self.verify(out, state, dt, **values)):
+            return out
+        self.fallbacks += 1
+        out = self.exact(driven, state, dt, **values)
+        if not self._accepts(self.verify(out, state, dt, **values)):
+            raise ConvergenceError(
+                f"law '{self.inner.law.name}': accuracy {self.choice.accuracy:g} asked, error {self.worst:.1e} found, and the exact "
+                "setting is no better: the data are too ill-conditioned for it; ask for less"
+            )
+        self.inner = self.exact
+        return out
+
+    def _accepts(self, bound: Bound) -> bool:
+        self.checks += 1
+        self.last = bound
+        self.worst = max(self.worst, float(bound.difference.max(initial=0.0)))
+        return bound.confirms(self.choice.accuracy)
+
+    def verify(
+        self,
+        out: StepResult,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        points: int = SAMPLE,
+        **values: Any,
+    ) -> Bound:
+        """The error of a step that was made from `state`, at up to `points` of its points, evenly spread."""
+        if self._trusted is None:
+            raise InputError(self.unchecked)
+        return error_bound(self._trusted, self.inner, out, state, dt, points=points, **values)
+
+
+def error_bound(
+    trusted: GeneralUpdate,
+    update: Any,
+    out: StepResult,
+    state: Mapping[str, Any] | None,
+    dt: float = 1.0,
+    *,
+    points: int | None = None,
+    **values: Any,
+) -> Bound:
+    """The error of the stress of a step of any method, formulation and dimension, bounded by the cone program's answer and its gap.
+
+    `trusted` is `GeneralUpdate.of(law, False)`; `out` is the answer of `update` from the old `state`. Raises `ConvergenceError` where the
+    program finds no answer.
+    """
+    law, shape = trusted.law, getattr(update, "dimension", SPACE)
+    count = len(out.status)
+    rows = np.arange(count) if points is None else np.unique(np.linspace(0, count - 1, min(points, count)).astype(int))
+    heat, rest = thermal_input(law, values, count)
+    numbers = law.admissible_values(rest)
+    temperature = None
+    if law.temperature is not None:
+        temperature = np.broadcast_to(heat.temperature, (count,))[rows]
+    assert out.strain is not None
+    eps = shape.embedded(np.asarray(out.strain, dtype=float))[rows]
+    old = _old_rows(law, shape, state, count)[rows]
+    found = trusted.solve(eps, old, dt, numbers, temperature, tangent=False)
+    if (found.status != 0).any():
+        raise ConvergenceError(
+            f"law '{law.name}': the cone program that checks the step finds no answer at {(found.status != 0).sum()} points"
+        )
+    best = found.slopes[:, list(shape.places)]
+    stress = np.asarray(out.stress, dtype=float)
+    if stress.shape[1] < best.shape[1]:  # of a relaxed dimension the given components
+        best = best[:, list(shape.given)]
+    scale = max(float(np.sqrt((stress**2).sum(axis=1)).max(initial=0.0)), np.finfo(float).tiny)
+    known: dict[Any, Any] = {p: numbers[p.name] for p in law.parameters} | {law.observable: eps}
+    stiffness = _stiffness(law, known, old, temperature)
+    difference = np.sqrt(((stress[rows] - best) ** 2).sum(axis=1)) / scale
+    gap = np.sqrt(2.0 * stiffness * np.maximum(solution_gap(found, len(rows)), 0.0)) / scale
+    residual = max((float(natural_map(part).max(initial=0.0)) for part in found.parts), default=0.0)
+    return Bound(difference, gap, residual)
+
+
+def _old_rows(law: Law, shape: Any, state: Mapping[str, Any] | None, count: int) -> Array:
+    """Old states in packed rows of three dimensions."""
+    packing = StatePacking.of(law)
+    if state is None:
+        return packing.pack(None, count)
+    size = shape.size
+    named = {}
+    for name, (_, length) in packing.layout.items():
+        value = np.asarray(state[name], dtype=float)
+        named[name] = shape.embedded(np.broadcast_to(value, (count, size))) if length == 6 else value
+    return packing.pack(named, count)
+
+
+def _stiffness(law: Law, known: Mapping[Any, Any], old: Array, temperature: Array | None) -> float:
+    """Largest eigenvalue of ∂²ψ/∂ε² at the points [Pa]."""
+    here = dict(known)
+    for variable, (start, length) in zip(law.internal, StatePacking.of(law).layout.values(), strict=False):
+        here[variable] = old[:, start] if length == 1 else old[:, start : start + length]
+    if temperature is not None:
+        here[law.temperature] = temperature
+    operator = second_derivative(law.energy, law.observable, law.observable)
+    if operator.extremes or operator.sandwiched:
+        return np.inf  # not written as matrices: the residual has to confirm the answer
+    matrices = operator_matrices(operator, here, len(old))
+    return float(np.linalg.eigvalsh(matrices).max(initial=0.0))
