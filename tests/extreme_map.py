@@ -1,4 +1,4 @@
-"""Rows as a table in text and as a picture: a line of boxes per group, a box per cell, with the decades between its error and its bound."""
+"""Rows as a table in text and as a picture: a line of boxes per group, a box per cell, with its error over its bound."""
 
 from __future__ import annotations
 
@@ -9,7 +9,11 @@ from typing import Any
 import numpy as np
 from extreme_rows import Row
 
-BLUE, ORANGE, BLACK = "#a6d3f0", "#f2b544", "#000000"  # told apart by every eye, and by their words
+ORANGE, BLACK = "#f2b544", "#000000"
+NEAR, FAR = (
+    np.array([86, 165, 222]) / 255,
+    np.array([226, 241, 252]) / 255,
+)  # blues: at the bound, and a millionth of it or less
 VERDICTS = ("right", "refused", "wrong")
 
 
@@ -19,13 +23,23 @@ def counted(rows: Sequence[Row]) -> str:
     return ", ".join(f"{found.count(verdict)} {verdict}" for verdict in VERDICTS) + f" of {len(rows)} cells"
 
 
-def decades(row: Row) -> str:
-    """Decades of the error over its bound, rounded; a word where there is none."""
+def share(row: Row) -> str:
+    """Error over its bound: to one digit from a tenth on, else its power of ten; a word where there is none."""
     if row.message:
         return row.verdict
     if row.error == 0.0:
         return "exact"
-    return f"{np.log10(row.ratio):+.0f}".replace("-", "−") if np.isfinite(row.ratio) else "∞"
+    if not np.isfinite(row.ratio):
+        return "∞"
+    return f"{row.ratio:.1g}" if row.ratio >= 0.095 else rf"$\mathbf{{10^{{{np.log10(row.ratio):.0f}}}}}$"
+
+
+def color(row: Row) -> Any:
+    """Blue, the lighter the farther from the bound; orange; black: told apart by every eye, and by their words."""
+    if row.verdict != "right":
+        return ORANGE if row.verdict == "refused" else BLACK
+    far = min(-np.log10(row.ratio) / 6.0, 1.0) if row.ratio > 0.0 else 1.0
+    return tuple(NEAR + far * (FAR - NEAR))
 
 
 def table(rows: Sequence[Row]) -> str:
@@ -70,27 +84,28 @@ def picture(rows: Sequence[Row]) -> Any:
     height = 0.62
     figure, axes = plt.subplots(figsize=(9.0, height * len(lines) + 0.7), layout="constrained")
     for y, (group, boxes) in enumerate(lines):
-        share = 1.0 / len(boxes)
+        part = 1.0 / len(boxes)
         label = "\n".join(textwrap.wrap(group, 26))
         axes.text(-0.012, y, label, ha="right", va="center", fontsize=9)
         for k, (row, name) in enumerate(boxes):
-            color = {"right": BLUE, "refused": ORANGE, "wrong": BLACK}[row.verdict]
             ink = "white" if row.verdict == "wrong" else "black"
-            box = plt.Rectangle((k * share, y - 0.46), share, 0.92, facecolor=color, edgecolor="white", linewidth=1.5)
+            box = plt.Rectangle(
+                (k * part, y - 0.46), part, 0.92, facecolor=color(row), edgecolor="white", linewidth=1.5
+            )
             axes.add_patch(box)
-            middle = (k + 0.5) * share
+            middle = (k + 0.5) * part
             axes.text(middle, y - 0.40, "\n".join(name), ha="center", va="top", fontsize=7, color=ink, linespacing=0.95)
-            axes.text(middle, y + 0.41, decades(row), ha="center", va="bottom", fontsize=8.5, color=ink, weight="bold")
+            axes.text(middle, y + 0.41, share(row), ha="center", va="bottom", fontsize=8.5, color=ink, weight="bold")
     axes.set_xlim(0.0, 1.0)
     axes.set_ylim(len(lines) - 0.5, -0.5)
     axes.set_axis_off()
     present = {row.verdict for row in rows}
     words = {
-        "right": "right: decades of the error over its bound",
+        "right": "right: error over its bound",
         "refused": "refused with a reason, as foreseen",
         "wrong": "wrong",
     }
-    colors = {"right": BLUE, "refused": ORANGE, "wrong": BLACK}
+    colors = {"right": tuple(NEAR + 0.4 * (FAR - NEAR)), "refused": ORANGE, "wrong": BLACK}
     shown = [verdict for verdict in VERDICTS if verdict in present]
     handles = [plt.Rectangle((0, 0), 1, 1, facecolor=colors[verdict]) for verdict in shown]
     figure.legend(handles, [words[v] for v in shown], loc="outside lower center", ncols=3, frameon=False, fontsize=9)

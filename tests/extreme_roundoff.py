@@ -298,7 +298,7 @@ RANGE = "leave the range of the exponent"
 SCENES = (("block stays", stays), ("block slides", slides), ("sphere rolls", rolls), ("stack stands", stands))
 CELLS: list[Cell] = [
     Cell(STEPS, "radial, DP, 1e7", lambda: radial("drucker_prager")),
-    Cell(STEPS, "radial, sand, 1e7", lambda: radial("sand")),
+    Cell(STEPS, "radial, sand, 1e7", lambda: radial("sand"), long=True),
     Cell(STEPS, "cycles, von Mises, 1e7", cycles),
     Cell(STEPS, "relaxation, Maxwell, 1e6", lambda: relaxation(MANY // 10)),
     Cell(STEPS, "relaxation, Maxwell, 1e7", relaxation, long=True),
