@@ -19,6 +19,7 @@ __all__ = ["NaturalUnits", "cleaned", "natural_units"]
 
 Array = NDArray[np.float64]
 CURVED = 1e-13
+NOISE = 1e-11  # of an image over the sizes of row and column: what eigenvectors leave of a product that is zero
 
 
 def cleaned(vectors: Array) -> Array:
@@ -54,7 +55,7 @@ def natural_units(
         plain[start : start + cone.size] = cone.kind not in (EXPONENTIAL, EXPONENTIAL_DUAL, POWER, POWER_DUAL)
         start += cone.size
     # cones are measured by the unknowns that have a unit, then free unknowns by the cones that have one, in turn
-    blocks = _block_norms(G @ measured, cones)
+    blocks = _block_norms(_images(G, measured), cones)
     count = int(strong.sum())
     while free.shape[1]:
         known = plain & (blocks > 0.0)
@@ -65,7 +66,7 @@ def natural_units(
         if not found.shape[1]:
             break
         measured = np.hstack([measured, found])
-        blocks = np.where(blocks > 0.0, blocks, _block_norms(G @ measured, cones))
+        blocks = np.where(blocks > 0.0, blocks, _block_norms(_images(G, measured), cones))
     blocks[blocks == 0.0] = 1.0
     # the rest meets exponential and power cones only
     _balance(blocks, cones, G, h, np.hstack([measured, free]), costed, slopes[:, 0])
@@ -91,6 +92,14 @@ def _normalised(G: Array, free: Array) -> tuple[Array, Array]:
     size[: s.size] = s
     live = size > 1e-9 * max(float(s.max(initial=0.0)), 1e-300)
     return cleaned(free @ vt[live].T) / size[live], cleaned(free @ vt[~live].T)
+
+
+def _images(G: Array, columns: Array) -> Array:
+    """G times columns, without the noise: a cone that an unknown does not meet must not be measured by it."""
+    found = G @ columns
+    size = np.linalg.norm(G, axis=1)[:, None] * np.linalg.norm(columns, axis=0)[None, :]
+    found[np.abs(found) <= NOISE * size] = 0.0
+    return found
 
 
 def _block_norms(G: Array, cones: Sequence[Cone]) -> Array:
