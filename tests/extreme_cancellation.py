@@ -11,7 +11,8 @@ Bounds, stated before any run; ε = 2.2e-16:
 * tangent of a cone: 100 ε ‖𝕂‖ ‖ε‖/‖dev ε‖, the rounding of the direction of the deviator;
 * tangent of the wires: 1e-6 ‖𝕂‖. (e_a − e_b)/(a − b) is replaced by its limit for gaps below 1e-9; above, it has some 4 ε/1e-9 of rounding.
   Across zero it is the ratio of two eigenvalues, each known to ε of the largest: 4 ε/gap there;
-* tangent of laws of principal values: symmetric to 1e-8 ‖𝕂‖ and between 0 and 𝕂, which is what a convex step allows.
+* tangent of laws of principal values: symmetric to 1e-8 ‖𝕂‖ and between 0 and 𝕂, which is what a convex step allows. As the stress turns
+  with the strain, 𝕋(Wε − εW) = Wσ − σW for every spin W, to 100 ε ‖𝕂‖ ‖ε‖: of a pair of eigenvalues that is the quotient of differences.
 """
 
 from __future__ import annotations
@@ -25,7 +26,7 @@ from extreme_roundoff import I6, moduli, stiffness
 from extreme_rows import Cell, Measured, near
 from extreme_steps import Cell as StepCell
 from extreme_steps import excess
-from law_truth import turned
+from law_truth import mandel, matrix, turned
 
 from fenchel.potentials.library import ENTRIES
 
@@ -167,6 +168,22 @@ def near_the_axis(name: str, distance: float) -> Measured:
 # -- principal values -----------------------------------------------------------------------------------------------------------------
 
 
+def spins() -> tuple[Any, ...]:
+    """The three unit spins."""
+    found = []
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        w = np.zeros((3, 3))
+        w[i, j], w[j, i] = 1.0, -1.0
+        found.append(w)
+    return tuple(found)
+
+
+def commutator(w: Any, tensor: Any) -> Any:
+    """W a − a W in Mandel components, (n, 6)."""
+    a = matrix(tensor)
+    return mandel(w @ a - a @ w)
+
+
 def by_optimality(name: str, eps: Any) -> Measured:
     """A law of principal values at strains (n, 6): conditions of optimality over their tolerance, and a tangent between 0 and 𝕂."""
     values = dict(ENTRIES[name].values)
@@ -178,7 +195,12 @@ def by_optimality(name: str, eps: Any) -> Measured:
     size = float(np.linalg.norm(whole, 2))
     turn = out.tangent.transpose(0, 2, 1)
     low, high = np.linalg.eigvalsh(0.5 * (out.tangent + turn)), np.linalg.eigvalsh(whole - 0.5 * (out.tangent + turn))
+    turned_strain, turned_stress = (np.stack([commutator(w, x) for w in spins()], axis=1) for x in (eps, out.stress))
+    spin = np.einsum("nij,nkj->nki", out.tangent, turned_strain) - turned_stress
     return {
+        "stress of a turned strain [Pa]": near(
+            spin, 0.0, abs=100 * EPS * size * np.linalg.norm(eps, axis=1)[:, None, None]
+        ),
         "residual over its tolerance [-]": (excess(StepCell(name, ""), eps, old, out), 1.0),
         "asymmetry of the tangent [Pa]": (float(np.abs(out.tangent - turn).max()), 1e-8 * size),
         "tangent below 0 [Pa]": (float(max(0.0, -low.min())), 1e-8 * size),
