@@ -21,9 +21,7 @@ from .reduced_single import single_method
 __all__ = ["StepPointers", "step_pointers"]
 
 Array = NDArray[np.float64]
-RANGE = (
-    1e150  # of the moduli of a curved projection, and its reciprocal: their squares stay in the range of the exponent
-)
+RANGE = 1e100  # of the moduli of a curved step, and its reciprocal: products of three stay in the range of the exponent
 
 
 @dataclass(frozen=True)

@@ -320,8 +320,8 @@ CELLS: list[Cell] = [
         for k in (-318, -310, -200, -100, 100, 200, 290)
     ),
     *(
-        Cell(UNIT + law, f"1e{k:+d}", lambda law=law, k=k: unit_of_stress(law, k), says=RANGE if k == 200 else "")
+        Cell(UNIT + law, f"1e{k:+d}", lambda law=law, k=k: unit_of_stress(law, k), says=RANGE if k == 120 else "")
         for law in CURVED
-        for k in (-90, 90, 200)
+        for k in (-90, 90, 120)
     ),
 ]
