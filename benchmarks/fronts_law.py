@@ -62,6 +62,12 @@ def main(first: int, last: int, out: Path) -> None:
         print(
             name, solver, " ".join(f"{p.error:.0e}" if p.error is not None else "-" for p in front.points), flush=True
         )
+    # what the engine errs by, where a compiled method tells: its own answer is no judge of itself
+    exact = json.dumps({"solver": "general"})
+    told = [
+        e for solver, table in found.items() if solver != "general" for _, e, _ in table.get(exact, ()) if e is not None
+    ]
+    floor = max(told, default=0.0)
     methods = {}
     for solver, table in found.items():
         points = []
@@ -70,6 +76,8 @@ def main(first: int, last: int, out: Path) -> None:
             costs = [c for c, e, _ in entries if e is not None]
             if len(errors) < len(entries) * SHARE:
                 continue
+            if solver == "general":
+                errors = [max(e, floor) for e in errors]
             figures = {"laws": float(len(errors)), "largest": max(errors), "median": median(errors)}
             points.append(
                 Measured(

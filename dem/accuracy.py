@@ -1,14 +1,17 @@
 r"""A scene for a wanted accuracy: which step and tolerance, known from scenes like it.
 
-What a scene is made for is its *measure*: the stress of a triaxial test, the place of free bodies, the angle of a deposit. `accuracy =
-1e-2` in a scene asks for its first measure to one per cent of its largest value. Step and tolerance then come from the front that `fenchel
-tradeoff dem` kept for the scene on this machine, else from tests of random scenes that are shipped: of those that are nearest in stiffness
-κ, inertial number, friction, size and wires, the setting is taken that was the cheapest of those that met the accuracy in nineteen of
-twenty, scenes left out in which no setting met it. After the run the residual is held against the largest of those scenes.
+What a scene is made for is its *measure*: the stress of a triaxial test, the place of free bodies, the angle of a deposit.
+`accuracy = 1e-2` in a scene asks for its first measure to one per cent of its largest value. Step and tolerance then come from the front
+that `fenchel tradeoff dem` kept for the scene on this machine, else from tests of random scenes that are shipped: the logarithm of their
+errors is fitted over those of step, tolerance, stiffness κ, inertial number and the like, and the cheapest setting is taken whose error,
+with the margin that 97 % of the tested scenes stay below when each is predicted from the others, does not exceed the accuracy. Some scenes
+are so sensitive that no setting has it: how many of the scenes alike can be told beforehand, which ones only by measuring. After the run
+the residual is held against the largest of the tested scenes.
 """
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -225,17 +228,13 @@ def features(scene: Scene) -> dict[str, float]:
     }
 
 
-WIDTHS = {
-    "kappa": 0.5,
-    "inertial": 0.4,
-    "friction": 0.3,
-    "size": 0.5,
-    "wires": 0.35,
-    "walked": 0.5,
-}  # at which likeness fades
-SHARE = 0.95  # of the scenes like it that shall meet the accuracy
+# at which likeness fades: decades, and of friction and wires their own size
+WIDTHS = {"kappa": 0.5, "inertial": 0.4, "friction": 0.3, "size": 0.5, "wires": 0.35, "walked": 0.5}
+SHARE = 0.97  # of the tested scenes, each predicted from the others, whose error is below what the margin allows
 UNLIKE = 1e-2  # scenes' worth of likeness below which nothing is known
 RARE = 0.1  # share of the scenes like it that can have an accuracy at all, below which it is refused
+RIDGE = 0.3
+FLOOR = 3.0  # times the least error of a scene: below, it is chaos and not the setting that is measured
 
 
 def choose(scene: AnyScene) -> SceneChoice:
@@ -268,59 +267,90 @@ def likeness(one: Mapping[str, float], other: Mapping[str, float]) -> float:
     return math.exp(-0.5 * sum(((one[k] - other[k]) / w) ** 2 for k, w in WIDTHS.items()))
 
 
+@dataclass(frozen=True)
+class _Model:
+    """log₁₀ of error and of relative cost, quadratic in the logarithms of step, tolerance, κ and inertial number and linear in the rest;
+    `margin` [decades] that 97 % of the scenes, each predicted from the others, stay below."""
+
+    error: Array
+    cost: Array
+    margin: float
+
+
+def _terms(here: Mapping[str, float], setting: Mapping[str, float]) -> Array:
+    t, h = math.log10(setting["tolerance"]) + 4.0, math.log10(setting["step"]) + 1.15
+    k, i = here["kappa"] - 3.0, here["inertial"] + 3.2
+    rest = (here["friction"] - 0.5, here["size"] - 2.2, here["wires"], here["walked"] + 2.0)
+    return np.array([1.0, t, h, t * t, h * h, t * h, k, i, *rest, t * k, t * i, h * k, h * i, k * i, k * k, i * i])
+
+
+def _fitted(terms: Array, values: Array) -> Array:
+    return np.linalg.solve(terms.T @ terms + RIDGE * np.eye(terms.shape[1]), terms.T @ values)
+
+
+def fit_model(shipped: Mapping[str, Any]) -> _Model:
+    """The model of shipped fronts; its margin by leaving one scene out at a time."""
+    terms, errors, costs, scene, clear = [], [], [], [], []
+    for n, row in enumerate(shipped["scenes"]):
+        least = min(e for e in row["errors"] if e is not None)
+        cheapest = min(c for c in row["seconds"] if c is not None)
+        for setting, error, seconds in zip(shipped["settings"], row["errors"], row["seconds"], strict=True):
+            if error is None:
+                continue
+            terms.append(_terms(row["features"], setting))
+            errors.append(math.log10(max(error, 1e-12)))
+            costs.append(math.log10(seconds / cheapest))
+            scene.append(n)
+            clear.append(error > FLOOR * least)
+    a, e, c, of, told = np.array(terms), np.array(errors), np.array(costs), np.array(scene), np.array(clear)
+    left = []
+    for n in np.unique(of):
+        others, own = told & (of != n), told & (of == n)
+        left.append(e[own] - a[own] @ _fitted(a[others], e[others]))
+    return _Model(_fitted(a[told], e[told]), _fitted(a, c), float(np.quantile(np.concatenate(left), SHARE)))
+
+
+@functools.cache
+def _model() -> _Model:
+    return fit_model(shipped_front("scene"))
+
+
 def predicted(
-    shipped: Mapping[str, Any], here: Mapping[str, float], accuracy: float
-) -> tuple[dict[str, float] | None, float, float, float, float]:
-    """(setting, share of scenes like it that meet the accuracy by it, largest residual, share in which any setting does, likeness)."""
+    shipped: Mapping[str, Any], model: _Model, here: Mapping[str, float], accuracy: float
+) -> tuple[dict[str, float], float, float, float, float]:
+    """(setting, its expected error, largest residual met under it, share of scenes like it that can have the accuracy, likeness).
+
+    The cheapest setting whose predicted error with the margin does not exceed the accuracy, else the one with the least predicted error.
+    """
+    settings = shipped["settings"]
+    terms = np.array([_terms(here, setting) for setting in settings])
+    error, cost = terms @ model.error, terms @ model.cost
+    good = error + model.margin <= math.log10(accuracy)
+    k = int(np.argmin(np.where(good, cost, np.inf))) if good.any() else int(np.argmin(error))
     rows = shipped["scenes"]
-    weights = [likeness(here, row["features"]) for row in rows]
-    able = [
-        (w, row)
-        for w, row in zip(weights, rows, strict=True)
-        if any(e is not None and e <= accuracy for e in row["errors"])
-    ]
-    whole, some = sum(weights), sum(w for w, _ in able)
-    if whole <= 0.0 or some <= 0.0:
-        return None, 0.0, math.nan, 0.0, whole
-    best: tuple[float, int, float] | None = None
-    for k in range(len(shipped["settings"])):
-        met = sum(w for w, row in able if row["errors"][k] is not None and row["errors"][k] <= accuracy) / some
-        cost = sum(w * math.log(_relative(row, k)) for w, row in able) / some
-        if met >= SHARE and (best is None or cost < best[0]):
-            best = (cost, k, met)
-    if best is None:  # none met it in nineteen of twenty: the one that did most often
-        shares = [
-            sum(w for w, row in able if row["errors"][k] is not None and row["errors"][k] <= accuracy) / some
-            for k in range(len(shipped["settings"]))
-        ]
-        k = int(np.argmax(shares))
-        best = (0.0, k, shares[k])
-    _, k, met = best
-    residual = max((row["residuals"][k] for _, row in able if row["residuals"][k] is not None), default=math.nan)
-    return dict(shipped["settings"][k]), met, float(residual), some / whole, whole
-
-
-def _relative(row: Mapping[str, Any], k: int) -> float:
-    """Cost of setting k over the least of the scene; one that failed counts as a hundred times."""
-    good = [c for c in row["seconds"] if c is not None]
-    return 100.0 if row["seconds"][k] is None else row["seconds"][k] / min(good)
+    weights = np.array([likeness(here, row["features"]) for row in rows])
+    able = np.array([any(e is not None and e <= accuracy for e in row["errors"]) for row in rows])
+    residual = max((row["residuals"][k] for row in rows if row["residuals"][k] is not None), default=math.nan)
+    whole = float(weights.sum())
+    share = float(weights @ able) / whole if whole > 0.0 else 0.0
+    return dict(settings[k]), float(10.0 ** error[k]), float(residual), share, whole
 
 
 def _from_shipped(scene: Scene, accuracy: float, measure: str) -> SceneChoice:
     shipped = shipped_front("scene")
-    setting, met, residual, able, whole = predicted(shipped, features(scene), accuracy)
+    setting, error, residual, able, whole = predicted(shipped, _model(), features(scene), accuracy)
     if whole < UNLIKE:
         raise InputError(
             f"accuracy = {accuracy:g}: no tested scene is like this one; measure it once: fenchel tradeoff dem SCENE.toml -o DIR"
         )
-    if setting is None or able < RARE:
+    if able < RARE:
         raise InputError(
             f"accuracy = {accuracy:g}: in {1.0 - able:.0%} of the scenes like this one no setting had it, two references differed by more; "
             "ask for less, or take more grains"
         )
-    source = f"{len(shipped['scenes'])} random scenes, the nearest counting most"
-    words = f"met in {met:.0%} of those in which any setting did ({able:.0%} of all like it)"
-    return _choice(accuracy, measure, setting, accuracy, residual, source, words)
+    source = f"{len(shipped['scenes'])} tested random scenes"
+    words = f"expected error {error:.0e}; {able:.0%} of the scenes like it can have {accuracy:g} at all, the others are too sensitive"
+    return _choice(accuracy, measure, setting, error, residual, source, words)
 
 
 def _choice(

@@ -1,6 +1,6 @@
 """`measured`: the solver that was the fastest on problems like this one.
 
-A problem is described by numbers that cost little: its size, how many blocks of W a contact has, its friction, and its errors after ten
+A problem is described by numbers that cost little: its size, its friction, and its errors after ten
 and after thirty sweeps of Gauss–Seidel (the probe, from which the chosen solver goes on), which tell well and ill conditioned problems
 apart. The seconds that every solver took on random problems are shipped (`fronts/contact.json`); each counts by its likeness to the
 problem at hand, and that solver is taken whose mean logarithm of time over the fastest is least. A solver that takes ten times what the
@@ -28,7 +28,8 @@ __all__ = ["TOLERANCES", "SolverChoice", "choose_solver", "features", "probe"]
 
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 EARLY, LATE = 10, 30  # sweeps of the probe
-WIDTHS = {"contacts": 0.35, "neighbours": 0.35, "friction": 0.35, "early": 1.0, "late": 1.0, "fall": 0.5}
+# decades (of the friction: its own size) at which likeness fades; from leaving out one of the shipped problems at a time
+WIDTHS = {"contacts": 0.13, "friction": 0.19, "early": 0.7, "late": 0.9}
 PATIENCE, LEAST = 10.0, 0.05  # times the expected seconds, and seconds, before `auto` takes over
 
 
@@ -55,7 +56,6 @@ def described(blocks: Blocks, friction: Any, early: float, late: float) -> dict[
     n = len(blocks.mu)
     return {
         "contacts": float(n),
-        "neighbours": len(blocks.column) / n,
         "friction": float(np.median(friction)),
         "early": early,
         "late": late,
@@ -74,11 +74,9 @@ def _coordinates(row: Mapping[str, float]) -> np.ndarray:
     early, late = max(row["early"], 1e-14), max(row["late"], 1e-15)
     found = {
         "contacts": math.log10(row["contacts"]),
-        "neighbours": math.log10(row["neighbours"]),
         "friction": min(row["friction"], 1.5),
         "early": math.log10(early),
         "late": math.log10(late),
-        "fall": math.log10(late / early),
     }
     return np.array([found[name] / width for name, width in WIDTHS.items()])
 
