@@ -1,10 +1,11 @@
 # Everything starts here: `make demo` and `make test` need Python (3.11 to 3.14) and make, nothing else.
-# PYTHON=... chooses the interpreter, OUT=... the folder of the demo, SECONDS=... how long to fuzz, JOBS=... how many
+# PYTHON=... chooses the interpreter, OUT=... the folder of the demo, SECONDS=... how long to fuzz and TARGET=... what, JOBS=... how many
 # processes share the tests.
 
 PYTHON ?= python3 python3.13 python3.12 python3.11 python3.14
 OUT ?= demo
 SECONDS := 60
+TARGET :=
 JOBS := 2
 VENV := .venv
 BIN := $(VENV)/bin
@@ -47,11 +48,14 @@ bench: $(PROJECT) $(VENV)/.test
 validate: $(PROJECT) $(VENV)/.test
 	$(BIN)/python -m pytest -q -m validate
 
-# New random examples, again and again, until the time is over or one fails.
+# A seeded search over laws, scenes, files and contact problems (TARGET=laws for one of them), then new random examples of the tests of
+# random inputs; two thirds of the time go to the search. What fails is printed as the line to add to tests/regression/fuzz_cases.txt.
 fuzz: $(PROJECT) $(VENV)/.test
-	@end=$$(( $$(date +%s) + $(SECONDS) )); round=0; \
+	@end=$$(( $$(date +%s) + $(SECONDS) )); \
+	PYTHONPATH=tests $(BIN)/python -m fuzz --seconds $$(( 2 * $(SECONDS) / 3 )) $(TARGET) || exit 1; \
+	round=0; \
 	while [ "$$(date +%s)" -lt "$$end" ]; do \
-	  round=$$((round + 1)); echo "fuzz: round $$round"; \
+	  round=$$((round + 1)); echo "fuzz: random examples, round $$round"; \
 	  $(BIN)/python -m pytest -q -x -m "not validate" --hypothesis-profile=fuzz --hypothesis-seed=random \
 	    tests/verification tests/extremes; code=$$?; \
 	  [ $$code -eq 0 ] || exit $$code; \

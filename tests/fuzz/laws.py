@@ -235,17 +235,23 @@ class Judge:
         if change:
             self.flow(force, change, size, work, rounding, who, loose, sharp)
         if out.tangent is not None and who != "explicit":
-            self.tangent(out.tangent, who)
+            self.tangent(out.tangent, who, stress, size[None])
 
-    def tangent(self, tangent: Any, who: str) -> None:
-        """Symmetric and positive semidefinite."""
+    def tangent(self, tangent: Any, who: str, stress: Any, size: Any) -> None:
+        """Symmetric and positive semidefinite.
+
+        Where the deviator of the stress is what rounding left of a spherical one, the direction of flow is rounding too (its trace is no
+        longer zero), and so are entries of the tangent in its share: the limit is 1e-6, or what rounding makes of that direction.
+        """
+        deviator = stress - stress[:, :3].mean(axis=1, keepdims=True) * np.array([1.0, 1, 1, 0, 0, 0])
+        limit = 1e-6 + 1e-13 * size / np.maximum(length(deviator), 1e-300)
         top = np.abs(tangent).max(axis=(1, 2))
         skew = np.abs(tangent - tangent.transpose(0, 2, 1)).max(axis=(1, 2))
-        self.hold(skew, 1e-6 * top, f"{who}: the tangent is not symmetric")
+        self.hold(skew, limit * top, f"{who}: the tangent is not symmetric")
         least = np.linalg.eigvalsh(
             0.5 * (tangent + tangent.transpose(0, 2, 1)) / np.where(top > 0, top, 1)[:, None, None]
         )
-        self.hold(-least[:, 0], np.full(len(top), 1e-6), f"{who}: the tangent has a negative direction")
+        self.hold(-least[:, 0], limit, f"{who}: the tangent has a negative direction")
 
     def hold(self, value: Any, limit: Any, what: str) -> None:
         """value ≤ limit at every point."""

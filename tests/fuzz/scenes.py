@@ -310,7 +310,7 @@ def finite(value: Any, at: str = "") -> list[str]:
     return []
 
 
-# what has no value: the half width of no box, masses and radii of fixed bodies, the slope of a heap too small to have one, κ of rigid grains
+# what has no value: the width of no box, masses and radii of fixed bodies, the slope of a heap too small to have one, κ of rigid grains
 MAY_BE_INFINITE = ("half", "mass", "angle", "reach", "height", "low", "kappa", "deflection", "start_half", "inertia")
 
 
