@@ -28,7 +28,7 @@ SIZES = {
     "factor": [100, 300, 700, 1500, 3000],  # contacts, one step of the interior point method
     "grains": [1000, 3000, 10_000, 30_000, 100_000],  # a time step of twenty sweeps, detection apart
     "detection": [1000, 3000, 10_000, 30_000, 100_000],  # a list of neighbours
-    "sweeps_needed": [100, 300, 1000, 3000],  # sweeps of compliant grains from rest to 1e-6, a count
+    "sweeps_needed": [100, 300, 1000],  # sweeps of compliant grains from rest to 1e-6, a count
     "beads": [1000, 3000, 10_000, 30_000, 100_000],  # a time step of twenty sweeps of a hung wire
     "beads_needed": [30, 100, 300, 1000],  # sweeps of a hung elastic wire to 1e-6, a count
 }

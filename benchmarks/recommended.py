@@ -2,9 +2,9 @@
 
 python benchmarks/recommended.py law FIRST LAST | contact FIRST LAST | scene FRONTS.json
 
-Laws: seeds of tests/random_laws.py with states that a step has reached; contact problems: seeds of tests/random_contacts.py; scenes: a file that
-`fronts_scene.py` wrote for seeds that are not shipped. Costs are times measured side by side, of contact problems with every solver
-given at most a second.
+Laws: seeds of tests/random_laws.py with states that a step has reached; contact problems: seeds of tests/random_contacts.py; scenes: a
+file that `fronts_scene.py` wrote for seeds that are not shipped. Costs are times measured side by side, of contact problems with every
+solver given at most a second.
 """
 
 from __future__ import annotations

@@ -73,6 +73,7 @@ def _dem(
                 "linked": record.linked,
                 "frames": len(record.leg),
                 "quality": record.quality,
+                "accuracy": _accuracy(output, record.quality["natural_map_max"]),
                 "measures": measures,
                 "exports": exported,
                 "kernels": load_run(output)[0].get("kernels", {}),
@@ -83,6 +84,7 @@ def _dem(
         print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
         _print_kernels(load_run(output)[0].get("kernels", {}))
         _print_state(measures, exported)
+        _print_accuracy(output, record.quality["natural_map_max"])
 
 
 def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
@@ -105,6 +107,7 @@ def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: b
                 "run": output,
                 "frames": len(frames["time"]),
                 "quality": quality,
+                "accuracy": _accuracy(output, quality["natural_map_max"]),
                 "measures": measures,
                 "exports": exported,
                 "kernels": content["kernels"],
@@ -115,6 +118,7 @@ def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: b
     print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(frames['time'])} frames")
     _print_kernels(content["kernels"])
     _print_state(measures, exported)
+    _print_accuracy(output, quality["natural_map_max"])
 
 
 def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
@@ -136,6 +140,7 @@ def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bo
             {
                 "run": output,
                 "quality": quality,
+                "accuracy": _accuracy(output, quality["natural_map_max"]),
                 "profile": profile,
                 "measures": measures,
                 "exports": exported,
@@ -147,6 +152,30 @@ def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bo
     print_table(("deposit", "value", "unit", "meaning"), rows, title=f"{output}")
     _print_kernels(content["kernels"])
     _print_state(measures, exported)
+    _print_accuracy(output, quality["natural_map_max"])
+
+
+def _accuracy(run: Path, residual: float) -> dict[str, Any] | None:
+    """What was chosen for the accuracy of the scene, and whether the residual of the run is of the kind that it was chosen from."""
+    from fenchel.dem.storage import load_run
+
+    said = load_run(run)[1].get("accuracy")
+    if said is None:
+        return None
+    largest = said["residual"]
+    return said | {"confirmed": None if largest is None else residual <= largest, "residual_of_run": residual}
+
+
+def _print_accuracy(run: Path, residual: float) -> None:
+    said = _accuracy(run, residual)
+    if said is None:
+        return
+    words = {
+        True: f"confirmed: its residual {residual:.1e} is one of those that the choice was made from (up to {said['residual'] or 0.0:.1e})",
+        False: f"NOT CONFIRMED: its residual {residual:.1e} is above all that the choice was made from ({said['residual'] or 0.0:.1e})",
+        None: "nothing to hold its residual against",
+    }
+    typer.echo(f"accuracy: {said['why']}; {words[said['confirmed']]}")
 
 
 def _print_state(measures: dict[str, float], exported: list[Path]) -> None:

@@ -184,8 +184,7 @@ def _reference(law: Law, load: Load, tangent: bool) -> _Reference:
     if own.solver == "general":
         return _Reference(found, energy, gap, "the engine")
     out = own(load.eps, load.state, load.dt, **load.values)
-    size = max(float(np.abs(found.stress).max(initial=0.0)), np.finfo(float).tiny)
-    apart = _largest(out.stress - found.stress) / size
+    apart = _longest(out.stress - found.stress) / max(_longest(found.stress), np.finfo(float).tiny)
     if apart > max(gap, 1e-8):
         return _Reference(found, energy, gap, f"the engine, {apart:.1e} from '{own.solver}'")
     energy = own.energy(load.eps, out.state, **load.values)
@@ -214,8 +213,8 @@ def _measured(
     except (FenchelError, ArithmeticError, np.linalg.LinAlgError) as problem:
         return Measured(setting=setting, cost=float("inf"), error=None, failure=" ".join(str(problem).split()))
     true = reference.out
-    scale = max(float(np.abs(true.stress).max(initial=0.0)), np.finfo(float).tiny)
-    error = _largest(out.stress - true.stress[:count]) / scale
+    scale = max(_longest(true.stress), np.finfo(float).tiny)
+    error = _longest(out.stress - true.stress[:count]) / scale
     energy = update.energy(own.eps, out.state, **own.values) if hasattr(update, "energy") else reference.energy[:count]
     size = max(float(np.abs(reference.energy).max(initial=0.0)), np.finfo(float).tiny)
     lost = max(float(np.abs(true.dissipation).max(initial=0.0)), 1e-3 * size)
@@ -233,6 +232,11 @@ def _measured(
 
 def _largest(difference: Array) -> float:
     return float(np.abs(difference).max(initial=0.0))
+
+
+def _longest(tensors: Array) -> float:
+    """The largest Frobenius norm."""
+    return float(np.sqrt((np.asarray(tensors, dtype=float) ** 2).sum(axis=1)).max(initial=0.0))
 
 
 def _tangent_error(found: Array | None, true: Array | None, count: int) -> float | None:
