@@ -5,7 +5,8 @@ K_μ ∋ p' ⊥ û ∈ K_μ*, û = ũ + μ‖ũ_t‖ n (p' = p less the law's le
 
     ‖p' − P_K(p' − ρ û)‖ / ‖p‖ ,   ρ = 1/(W_n + c_n) per contact,
 
-is zero exactly at solutions (de Saxcé and Feng 1998; Acary, Brémond and Huber 2018). Walls and links are half lines (rods: lines).
+is zero exactly at solutions (de Saxcé and Feng 1998; Acary, Brémond and Huber 2018); where all impulses are rounding, relative to the size
+below which the sweeps take them for that. Walls and links are half lines (rods: lines).
 
 Energy of a step of the θ-scheme, with v_θ = θ v⁺ + (1−θ) v⁻ and so q⁺ − q⁻ = h v_θ, exactly:
 
@@ -59,14 +60,17 @@ SUMS = {
 }  # fmt: skip
 
 
-def finish(out: NDArray[np.float64], step: float, bodies: int, elastic_before: float) -> dict[str, float]:
-    """The measures by name, from the sums of the kernels."""
+def finish(
+    out: NDArray[np.float64], step: float, bodies: int, elastic_before: float, floor: float = 0.0
+) -> dict[str, float]:
+    """The measures by name, from the sums of the kernels; impulses below `floor` [N s] are rounding, to the sweeps too."""
     s = {name: float(out[place]) for name, place in SUMS.items()}
     closed = s["closed"]
     mean_impulse = s["force"] / closed if closed else 0.0
     algorithmic = s["algorithmic"] + s["wires"]
+    size = max(s["size"], floor * floor)
     return {
-        "natural_map": float(np.sqrt(s["squared"] / s["size"] if s["size"] > 0.0 else s["squared"])),
+        "natural_map": float(np.sqrt(s["squared"] / size if size > 0.0 else s["squared"])),
         "natural_map_max": float(np.sqrt(s["worst"])) / (mean_impulse if mean_impulse > 0.0 else 1.0),
         "violation_max": s["violation_max"],
         "overlap_mean": s["overlap"] / closed if closed else 0.0,

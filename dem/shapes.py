@@ -50,7 +50,9 @@ def lattice(count: int, low: Array, high: Array, pitch: float) -> Array:
     Raises `InputError` when the block from `low` to `high` is too small for them.
     """
     low, high = np.asarray(low, dtype=float), np.asarray(high, dtype=float)
-    fits = np.maximum(0, np.floor((high - low) / pitch + 1e-9).astype(np.int64))
+    # no more along an axis than there are bodies, so that a block of any size is counted
+    with np.errstate(over="ignore"):
+        fits = np.clip(np.floor((high - low) / pitch + 1e-9), 0, max(count, 1)).astype(np.int64)
     if np.prod(fits) < count:
         raise InputError(
             f"region: {count} bodies of pitch {1e3 * pitch:.3g} mm do not fit {' x '.join(f'{1e3 * s:.3g}' for s in high - low)} mm; "

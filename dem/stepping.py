@@ -345,7 +345,7 @@ class Simulation:
         c["vel"][:] = c["free"]
         self._step.assess(*(c[name] for name in self._signatures["assess"]))
         self._walls_energy(c, out)
-        measures = finish(out, step, len(a.x) - int(self._fixed.sum()), a.elastic_energy)
+        measures = finish(out, step, len(a.x) - int(self._fixed.sum()), a.elastic_energy, self._floor / step)
         if not np.all(np.isfinite(out)):
             raise ConvergenceError(
                 f"the step at t = {a.time:.6g} s is not finite: reduce the step (now {step:.3g} s) or check the overlaps of the start state"
