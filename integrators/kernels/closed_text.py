@@ -7,8 +7,8 @@ With B = dev Σ a_k A_k at frozen internal variables, q = ‖B‖:
     apex     γ = (f − a q)/w_m;                                    dev ΔX_k = a_k B/w_q;
 
 and tr ΔX_k = 3 b_k γ, Δs_j = r_j γ in both; the dissipation is k γ. That the apex is right wherever the cone formula leaves q < 0 follows
-from convexity. The tangent is c₀ 𝕀 + c₁ I⊗I + c₂ n⊗n + c₃ (n⊗I + I⊗n), n = B/q. Written per layout of the state, for the components that exist and
-the precision of the arrays (all arithmetic is in float64); a law enters through numbers.
+from convexity. The tangent is c₀ 𝕀 + c₁ I⊗I + c₂ n⊗n + c₃ (n⊗I + I⊗n), n = B/q. Written per layout of the state, for the components
+that exist and the precision of the arrays (all arithmetic is in float64); a law enters through numbers.
 
 Coefficients: a, w_q, w_m, g_q, g_T, f at zero, k, stiffness pair, stress at zero; per tensor k_B, k_T, a_k, b_k, moduli pair; per scalar
 k_s, r_j; then those of the energies of the strain. Plan: tensors, scalars, strain terms (1) or not (0), then the places in the packed
