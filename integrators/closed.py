@@ -74,6 +74,8 @@ def _check_kind(reduction: Reduction, solver: str) -> None:
         raise NoReduction(
             f"{rule}: no closed form: it takes one surface, affine in one deviator norm, traces and scalars"
         )
+    if solver == "reduced" and not reduction.unknowns:
+        raise NoReduction(f"{rule}: nothing flows, there is nothing to reduce; the method for it is 'closed'")
     if solver == "reduced" and reduction.kind != "norm":
         raise NoReduction(f"{rule}: phi_star depends on principal values; the method for them is 'principal'")
     if solver == "principal" and reduction.kind != "principal":

@@ -26,6 +26,7 @@ from .step_program import StepProgram
 __all__ = ["ConicSolution", "ConicStep", "conic_step", "reference"]
 
 Array = NDArray[np.float64]
+UNPOLISHED = 1e-3  # mismatch over the size of the data up to which an answer without polish counts as one
 
 
 @dataclass(frozen=True)
@@ -217,6 +218,17 @@ def _dual(shown: Any, kind: int) -> Array:
     return np.array([x, y, z])
 
 
+def _mismatch(program: StepProgram, d: Array, y: Array, multipliers: Array) -> float:
+    """Largest entry of (Py + q + Gᵀλ, λ − Π_{K*}(λ − s)) over the largest of q and h: what an answer is worth, whatever its status."""
+    from .certificate import dual_projection
+
+    q, h = program.q0 + program.q1 @ d, program.h0 + program.h1 @ d
+    inside = dual_projection(program, (multipliers - h + program.G @ y)[None])[0]
+    wrong = np.concatenate([program.p * y + q + multipliers @ program.G, multipliers - inside])
+    size = max(np.abs(q).max(initial=0.0), np.abs(h).max(initial=0.0)) or 1.0
+    return float(np.abs(wrong).max(initial=0.0) / size)
+
+
 def reference(
     step: GeneralStep, eps: Array, old: Array, temperature: Array | None, tolerance: float = 1e-8
 ) -> StepSolution:
@@ -233,6 +245,10 @@ def reference(
             y, multipliers, said = given.unpolished(tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance)
             if y is None or multipliers is None:
                 status[i] = Status.INFEASIBLE if "infeasible" in said else Status.ITERATION_LIMIT
+                continue
+            residual[i] = _mismatch(program, data[row], y, multipliers)
+            if not residual[i] <= UNPOLISHED:
+                status[i] = Status.ITERATION_LIMIT
                 continue
             slopes[i] = slopes_of(program, data[row : row + 1], y[None], multipliers[None])[0, : slopes.shape[1]]
             if not step.stress:

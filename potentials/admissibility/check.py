@@ -10,11 +10,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from sympy import Rational
-
 from ...errors import InputError
 from ..law import Law
-from .conditions import Condition, as_conditions, holds, softens
+from .conditions import Condition, as_conditions, exact_values, holds, softens
 from .convexity import Proof
 from .counterexample import CounterExample
 from .draws import parameter_draws
@@ -130,7 +128,7 @@ class _Check:
                 return True
             for condition in failed:
                 self._soften(condition)
-        exact = {p: Rational(repr(v)) for p, v in self.values.items()}
+        exact = exact_values(self.values, self.law._expressions())
         infinite = next((c for c in failed if _is_nan(c.value(self.values))), None)
         if infinite is not None:
             self.reasons.append(f"{head}: refuted, {infinite} is not finite for the values given")

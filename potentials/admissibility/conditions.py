@@ -7,7 +7,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sympy import Abs, Add, Expr, Mul, Rational, S, factor, fraction, together
+from sympy import Abs, Add, Expr, Float, Mul, Pow, Rational, S, factor, fraction, together
 
 from ..atoms.atom import Invariant
 from ..enforce import ROUNDING
@@ -15,7 +15,18 @@ from ..ranked import Ranked
 from ..scalars import FrozenScalar, Parameter, ScalarVariable, Temperature
 from .bounds import EVERYWHERE, interval, natural_range, sharp_interval
 
-__all__ = ["Condition", "Need", "as_conditions", "holds", "only_at_zero_of", "softens"]
+__all__ = ["Condition", "Need", "as_conditions", "exact_values", "holds", "only_at_zero_of", "softens"]
+
+
+def exact_values(values: Mapping[Any, float], expressions: Iterable[Expr]) -> dict[Any, Expr]:
+    """Values as rational numbers; but an exponent of many digits as a decimal one of thirty, since sympy would write a rational power of a
+    rational number as roots of integers that fill the memory."""
+    raised = {s for e in expressions for power in e.atoms(Pow) for s in power.exp.free_symbols}
+    found: dict[Any, Expr] = {}
+    for symbol, value in values.items():
+        number = Rational(repr(float(value)))
+        found[symbol] = Float(repr(float(value)), 30) if symbol in raised and number.q > 100 else number
+    return found
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,7 @@ class Condition(str):
         expression: Any = self.expression
         if self.on_state or expression.has(Invariant):
             return None
-        exact = {s: Rational(repr(float(v))) for s, v in values.items()}
+        exact = exact_values(values, [expression])
         if any(s not in values for s in self.symbols):
             bottom = fraction(expression)[1].xreplace(exact)
             return (math.nan, 1.0) if bottom.is_zero else None
