@@ -38,12 +38,14 @@ def find_pairs(
     if x.shape[0] < 2:
         return np.empty((0, 2), dtype=np.int32)
     dimension = x.shape[1]
-    find = detection(dimension).module.find
+    chained = bool((wire >= 0).any())
+    find = detection(dimension, chained).module.find
+    chains = (wire, rank, apart) if chained else ()
     offsets = np.array(list(product((-1, 0, 1), repeat=dimension)), dtype=np.int64)
     held = np.zeros(len(x), dtype=bool) if fixed is None else fixed
     pairs = np.empty((16 * x.shape[0], 2), dtype=np.int32)
     while True:
-        found = find(x, radius, held, wire, rank, apart, skin, offsets, pairs)
+        found = find(x, radius, held, *chains, skin, offsets, pairs)
         if found <= len(pairs):
             return pairs[:found].copy()
         pairs = np.empty((found, 2), dtype=np.int32)

@@ -1,4 +1,4 @@
-"""Kernel of detection: cell list with a skin, in as many dimensions as the scene has."""
+"""Kernel of detection: cell list with a skin, in as many dimensions as the scene has; ranks along wires where there are wires."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ __all__ = ["DETECTION"]
 
 DETECTION = '''
 @njit
-def find(x, radius, fixed, wire, rank, apart, skin, offsets, out):
+def find(x, radius, fixed, $chains skin, offsets, out):
     """Write pairs (i < j, sorted) with gap below the skin to `out`; returns how many there are, which may be more than fit."""
     count = x.shape[0]
     low = np.empty($dimension)
@@ -70,10 +70,11 @@ def find(x, radius, fixed, wire, rank, apart, skin, offsets, out):
                     reach = radius[i] + radius[j] + skin
                     d_@ = x[i, @] - x[j, @]
                     if SUM(d_@ * d_@) < reach * reach and not (fixed[i] and fixed[j]):
-                        tied = wire[i] >= 0 and wire[i] == wire[j] and abs(rank[i] - rank[j]) < apart
-                        if not tied:
-                            near[near_count] = j
-                            near_count += 1
+                        if wire[i] >= 0 and wire[i] == wire[j] and abs(rank[i] - rank[j]) < apart:  #? wires
+                            j = following[j]  #? wires
+                            continue  #? wires
+                        near[near_count] = j
+                        near_count += 1
                 j = following[j]
         for k in range(1, near_count):
             j = near[k]

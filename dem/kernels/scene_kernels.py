@@ -306,7 +306,7 @@ class SceneKernels:
     def all(self) -> tuple[Kernel, ...]:
         """Every generated module of the scene; the modules a module calls come first."""
         kinds = (self.bodies, self.pairs, self.walls, self.links)
-        found = [detection(self.dimension), *(kernel for kernel in kinds if kernel is not None)]
+        found = [detection(self.dimension, self.wire is not None), *(kernel for kernel in kinds if kernel is not None)]
         for kernel in found:
             _ = kernel.module
         return (*found, self.step[0])
@@ -331,9 +331,12 @@ class SceneKernels:
 
 
 @cache
-def detection(dimension: int) -> Kernel:
-    """The kernel of detection in 2 or 3 dimensions."""
-    components = ", ".join(f"c_{a}" for a in range(dimension))
-    return Kernel(
-        "detection", expand(DETECTION, dimension, {}, {"dimension": dimension, "components": components}), Columns(())
-    )
+def detection(dimension: int, wires: bool = False) -> Kernel:
+    """The kernel of detection in 2 or 3 dimensions, between grains alone or where some bodies are beads of `wires`."""
+    values = {
+        "dimension": dimension,
+        "components": ", ".join(f"c_{a}" for a in range(dimension)),
+        "chains": "wire, rank, apart," if wires else "",
+    }
+    text = expand(DETECTION, dimension, {"wires": wires}, values).replace("fixed,  skin", "fixed, skin")
+    return Kernel("detection", text, Columns(()))
