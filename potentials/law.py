@@ -256,8 +256,8 @@ class Law:
         accuracy: float | None = None,
         insist: bool = False,
     ) -> Any:
-        """The implicit step as an `Update`; see `fenchel.integrators.build_update`. With `accuracy`, the relative error of the stress that is
-        wanted, the cheapest setting known to meet it is taken and its answers are checked: `.choice` says which, and why.
+        """The implicit step as an `Update`; see `fenchel.integrators.build_update`. With `accuracy`, the relative error of the stress that
+        is wanted, the cheapest setting known to meet it is taken and its answers are checked: `.choice` says which, and why.
 
         A law that `check` refutes is refused with the counter-example; `insist=True` compiles it all the same and enforces no condition
         on its parameters but their bounds.

@@ -1,4 +1,5 @@
-"""Failures that the search found (`tests/fuzz`, one line each in `fuzz_cases.txt`), and the first seeds of every target as a sample of it."""
+"""Failures that the search found (`tests/fuzz`, one line each in `fuzz_cases.txt`), and the first seeds of every target as a sample of
+it."""
 
 from pathlib import Path
 
