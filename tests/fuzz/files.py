@@ -367,7 +367,9 @@ def read_path_file(folder: Path, file: Path) -> tuple[str, tuple[str, ...]]:
     except FenchelError as error:
         foreseen(error)
         return "refused", ()
-    for part in (plan.time, plan.targets[:, plan.control], plan.trace_targets, plan.temperature):
+    # components that a trace condition replaces have no target, and say so by nan
+    given = plan.targets if plan.trace is None else plan.targets[:, ~np.isnan(plan.targets).all(axis=0)]
+    for part in (plan.time, given, plan.trace_targets, plan.temperature):
         if part is not None and not np.isfinite(part).all():
             raise Failure("a path is read that holds a number which is not finite")
     law = "thermo_elasto_plastic" if plan.temperature is not None else "von_mises"

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "docs/install.md"]
+PAGES = ["README.md", "CONTRIBUTING.md", "ARCHITECTURE.md", "docs/install.md", "docs/howto/fuzz.md"]
 
 
 def test_the_law_of_the_readme_is_admissible():
