@@ -285,7 +285,9 @@ def _terms(here: Mapping[str, float], setting: Mapping[str, float]) -> Array:
 
 
 def _fitted(terms: Array, values: Array) -> Array:
-    return np.linalg.solve(terms.T @ terms + RIDGE * np.eye(terms.shape[1]), terms.T @ values)
+    return np.asarray(
+        np.linalg.solve(terms.T @ terms + RIDGE * np.eye(terms.shape[1]), terms.T @ values), dtype=np.float64
+    )
 
 
 def fit_model(shipped: Mapping[str, Any]) -> _Model:
