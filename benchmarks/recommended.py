@@ -1,6 +1,6 @@
 """Does what is recommended hold on cases that nobody has seen? Shares that meet the accuracy, and the cost over the best setting's.
 
-python benchmarks/recommended.py law FIRST LAST | contact FIRST LAST | scene FRONTS.json
+python benchmarks/recommended.py law FIRST LAST | contact FIRST LAST | contact FRONTS.json | scene FRONTS.json
 
 Laws: seeds of tests/random_laws.py with states that a step has reached; contact problems: seeds of tests/random_contacts.py; scenes: a
 file that `fronts_scene.py` wrote for seeds that are not shipped. Costs are times measured side by side, of contact problems with every
@@ -21,7 +21,7 @@ sys.path.insert(0, str(Path(__file__).parents[1] / "tests"))
 
 def told(accuracy, cases, met, ratios, note=""):
     """One line of the table."""
-    r = np.array(ratios)
+    r = np.array(ratios or [np.nan])
     print(
         f"accuracy {accuracy:g}: met in {met} of {cases} ({met / max(cases, 1):.1%}); cost over the best: mean {r.mean():.2f}, "
         f"median {np.median(r):.2f}, {np.mean(r <= 1.5):.0%} within 1.5 {note}",
@@ -29,7 +29,7 @@ def told(accuracy, cases, met, ratios, note=""):
     )
 
 
-def laws(first, last, points=200):
+def laws(first, last, points=100):
     """Every law with its own random states; the best of all settings that meet the accuracy is the yardstick."""
     from random_laws import random_law
 
@@ -39,6 +39,8 @@ def laws(first, last, points=200):
     wanted = (1e-3, 1e-6, 1e-8)
     cases, met, ratios, refused = dict.fromkeys(wanted, 0), dict.fromkeys(wanted, 0), {a: [] for a in wanted}, 0
     for seed in range(first, last):
+        if seed > first and (seed - first) % 40 == 0:
+            print(f"after {seed - first}:", {a: f"{met[a]} of {cases[a]}" for a in wanted}, flush=True)
         drawn = random_law(np.random.default_rng(seed))
         try:
             solver = drawn.law.compile().solver
@@ -82,6 +84,8 @@ def contacts(first, last, limit=1.0):
     )
     solve(problem(1)[1], accuracy=1e-3)
     for seed in range(first, last):
+        if seed > first and (seed - first) % 40 == 0:
+            print(f"after {seed - first}:", {a: f"{met[a]} of {cases[a]}" for a in wanted}, flush=True)
         _, given = problem(seed)
         if not np.any(given.q[0::3] < 0.0):
             continue
@@ -105,6 +109,30 @@ def contacts(first, last, limit=1.0):
             ratios[accuracy],
             f"; of all time {totals[accuracy][0] / totals[accuracy][1]:.2f}",
         )
+
+
+def contacts_of(file):
+    """The solver chosen for each problem of a file that `fronts_contact.py` wrote; where it does not come to its end, `auto` behind it."""
+    from fenchel.dem.one_step.choice import choose_solver
+
+    fronts = json.loads(Path(file).read_text())
+    for accuracy in (1e-3, 1e-6, 1e-9):
+        k = fronts["tolerances"].index(accuracy)
+        cases, met, ratios, spent, least = 0, 0, [], 0.0, 0.0
+        for row in fronts["rows"]:
+            seconds = {s: t[k] for s, t in row["seconds"].items()}
+            good = [t for t in seconds.values() if t is not None]
+            if not good:
+                continue
+            cases += 1
+            own = seconds[choose_solver(row["features"], accuracy).solver]
+            if own is None and seconds["auto"] is not None:
+                own = fronts["limit"] + seconds["auto"]
+            if own is not None:
+                met += 1
+                ratios.append(own / min(good))
+                spent, least = spent + own, least + min(good)
+        told(accuracy, cases, met, ratios, f"; of all time {spent / least:.2f}")
 
 
 def scenes(file):
@@ -142,6 +170,8 @@ if __name__ == "__main__":
     start = time.time()
     if sys.argv[1] == "scene":
         scenes(sys.argv[2])
+    elif len(sys.argv) == 3:
+        contacts_of(sys.argv[2])
     else:
         {"law": laws, "contact": contacts}[sys.argv[1]](int(sys.argv[2]), int(sys.argv[3]))
     print(f"{time.time() - start:.0f} s")
