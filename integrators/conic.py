@@ -26,7 +26,7 @@ from .step_program import StepProgram
 __all__ = ["ConicSolution", "ConicStep", "conic_step", "reference"]
 
 Array = NDArray[np.float64]
-UNPOLISHED = 1e-3  # mismatch over the size of the data up to which an answer without polish counts as one
+UNPOLISHED = 1e-4  # mismatch over the size of the data up to which an answer without polish counts as one
 
 
 @dataclass(frozen=True)

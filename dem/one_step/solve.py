@@ -107,18 +107,18 @@ def solve(
     n = problem.contact_count
     r, proof = np.zeros(3 * n), None
     sweeps = factorisations = 0
-    # r = 0 is a solution exactly when no contact closes by itself
-    if n and np.any(problem.q[0::3] < 0.0):
-        blocks = scaled_blocks(problem)
-        monitor = Monitor(problem, blocks, tolerance, time_limit)
-        monitor(blocks.unknowns(_given(start, n)))
-        if not monitor.converged:
-            # iterates may leave the range of numbers; what is returned is the best that was measured
-            with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+    # data and iterates may leave the range of numbers; what is returned is the best that was measured, and its errors say so
+    with np.errstate(over="ignore", invalid="ignore", divide="ignore"):
+        # r = 0 is a solution exactly when no contact closes by itself
+        if n and np.any(problem.q[0::3] < 0.0):
+            blocks = scaled_blocks(problem)
+            monitor = Monitor(problem, blocks, tolerance, time_limit)
+            monitor(blocks.unknowns(_given(start, n)))
+            if not monitor.converged:
                 proof = SOLVERS[solver][1](blocks, monitor)
-        r, sweeps, factorisations = blocks.reactions(monitor.best), monitor.sweeps, monitor.factorisations
-    seconds = time.thread_time() - began
-    errors = measure(problem, r)
+            r, sweeps, factorisations = blocks.reactions(monitor.best), monitor.sweeps, monitor.factorisations
+        seconds = time.thread_time() - began
+        errors = measure(problem, r)
     if errors.worst <= tolerance:
         status = Status.CONVERGED
     elif proof is not None:
