@@ -74,7 +74,8 @@ def walk(
 
     An interrupt from the keyboard is taken between two steps: checkpoint, then `KeyboardInterrupt`.
     """
-    with _interrupts() as stopped:
+    # a step that leaves the range of numbers is refused by its own check, not by a warning of numpy beside it
+    with _interrupts() as stopped, np.errstate(over="ignore", invalid="ignore"):
         _walk(stage, share, progress, checkpoint, every, stopped)
 
 

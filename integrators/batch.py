@@ -35,6 +35,8 @@ INFEASIBLE = 9
 TAU, TERM_TAU = 100.0, 1e4
 OTHER_TAUS = (10.0, 0.3, 1e3)
 STEPS = 60
+# relative duality gap up to which an answer that the engine could not finish counts as one
+NEAR_GAP = 1e-8
 # rows that a thread takes at a time: enough to forget the call, few enough to share the work evenly
 CHUNK = 256
 
@@ -128,8 +130,13 @@ def solve_batch(
         failed = infeasible & (found.status[left] > ROUNDING)
         found.status[left[failed]] = INFEASIBLE
         # a residual at the level of the last digits of large data is an answer, though not to the asked tolerance
-        near = (found.status[left] == ITERATION_LIMIT) & (found.residual[left] <= 1e-10)
-        found.status[left[near]] = ROUNDING
+        near = left[(found.status[left] == ITERATION_LIMIT) & (found.residual[left] <= 1e-10)]
+        if near.size:
+            from .certificate import relative_gap
+
+            # of data that cancel, or of moduli that are decades apart, so much may be left of the residual that the answer is none
+            gap = relative_gap(small, data[near], found.y[near], found.multipliers[near])
+            found.status[near[gap <= NEAR_GAP]] = ROUNDING
     return found
 
 

@@ -24,7 +24,7 @@ from .general_step import GeneralStep, Part, StepSolution
 from .scalar_terms import ENTROPY_TERM, EXPONENTIAL_TERM, POWER_TERM
 from .step_program import StepProgram
 
-__all__ = ["duality_gap", "natural_map", "solution_gap", "term_values"]
+__all__ = ["duality_gap", "natural_map", "relative_gap", "solution_gap", "term_values"]
 
 Array = NDArray[np.float64]
 
@@ -60,7 +60,18 @@ def natural_map(part: Part) -> Array:
 
 def part_gap(part: Part) -> Array:
     """Gap [J/m³] of the points of one program."""
-    program, y, multipliers, q, h, s = _arrays(part)
+    return _gap(*_arrays(part))
+
+
+def relative_gap(program: StepProgram, data: Array, y: Array, multipliers: Array) -> Array:
+    """Gap over the sum of the sizes of the terms of primal and dual, per row of `data`; unknowns and multipliers are those of `program`."""
+    q, h = program.q0 + data @ program.q1.T, program.h0 + data @ program.h1.T
+    size = np.abs(q * y).sum(axis=1) + np.abs(h * multipliers).sum(axis=1) + (program.p * y * y).sum(axis=1)
+    gap = _gap(program, y, multipliers, q, h, h - y @ program.G.T)
+    return gap / np.where(size > 0.0, size, 1.0)
+
+
+def _gap(program: StepProgram, y: Array, multipliers: Array, q: Array, h: Array, s: Array) -> Array:
     stationary = y * program.p + q + multipliers @ program.G
     value = np.einsum("ij,ij->i", y, y * program.p + q) + np.einsum("ij,ij->i", h, multipliers)
     # Moreau: what s lacks to K is the part of −s in K*

@@ -24,9 +24,10 @@ def mobilised_friction(network: Network, *, kind: str | None = None) -> NDArray[
     mu = network.friction[chosen]
     if np.isnan(mu).any():
         raise InputError("sliding: the friction of some contacts is not known: make the network with friction=...")
-    with_friction = mu > 0.0
+    limit = mu * network.normal_force[chosen]
+    with_friction = (mu > 0.0) & (limit != 0.0)  # a coefficient of 1e-320 is none
     tangential = np.linalg.norm(network.tangential_force[chosen][with_friction], axis=1)
-    return tangential / (mu[with_friction] * network.normal_force[chosen][with_friction])
+    return tangential / limit[with_friction]
 
 
 def sliding_fraction(network: Network, *, kind: str | None = None, tolerance: float = 1e-6) -> float:

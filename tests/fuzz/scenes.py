@@ -22,8 +22,9 @@ from fenchel.errors import FenchelError
 from .case import Failure, command, digest_of, foreseen, pack
 
 PLAIN = True
-PROMISED = 300.0
-"""Residual over tolerance: sweeps stop on the change of the impulses of one sweep; a contraction that is slow leaves more than that."""
+PROMISED = 3000.0
+"""Residual over tolerance: sweeps stop on the change of the impulses of one sweep, of which a contraction by 1 − 1/n leaves n times as
+much; n reaches some hundreds in stacks that settle within the limit of sweeps, and the residual adds the scale of each contact."""
 STEPS = 400  # of a motion; a scene that asks for more, or for more bodies than `BODIES`, is only read
 BODIES = 80
 SHARED = ("rigid_rod", "elastic_rod", "rigid_wire", "elastic_wire")
@@ -329,7 +330,9 @@ def judge_run(case: dict[str, Any], run: Path) -> None:
     # a scene that was spoilt and still runs (a gravity of 1e18 m/s²) promises no contraction of its sweeps
     if not case["wrong"] and not worst <= max(PROMISED * tolerance, 1e-12):
         raise Failure(f"a step ends at natural map {worst:.2e} where sweeps stop at {tolerance:.0e}")
-    if "frames" in content and "external" in quality:
+    # what moves a body of infinite mass is in no term of the energy
+    driven = any("mass" not in body and any(body.get("velocity", ())) for body in scene.get("body", ()))
+    if "frames" in content and "external" in quality and not driven:
         energies(content, quality)
 
 
