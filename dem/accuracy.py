@@ -186,6 +186,9 @@ class SceneChoice:
     source: str
     why: str
 
+    def __str__(self) -> str:
+        return self.why
+
     def confirmed(self, residual: float) -> bool | None:
         """Whether a finished run is one of the kind that the choice was made from; None where that is not known."""
         return None if math.isnan(self.residual) else residual <= self.residual
