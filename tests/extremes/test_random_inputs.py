@@ -55,7 +55,7 @@ def test_a_random_scene_is_read(scene):
         assert np.isfinite(bodies_of(found).x).all()
 
 
-@few(25)
+@few(10)
 @given(contact_problems())
 def test_a_claim_about_a_random_contact_problem_is_true(case):
     contacts.judge(case)
