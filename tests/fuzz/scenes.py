@@ -23,7 +23,7 @@ from .case import Failure, command, digest_of, foreseen, pack
 
 PLAIN = True
 PROMISED = 3000.0
-"""Residual over tolerance, or the limit of sweeps if that is more: sweeps stop on the change of the impulses of one sweep, and a contraction
+"""Residual over tolerance, or the limit of sweeps if that is more: sweeps stop on the change of impulses of one sweep, and a contraction
 slow enough for that many sweeps (stacks, rigid chains) leaves as many times as much; never more than a tenth."""
 STEPS = 400  # of a motion; a scene that asks for more, or for more bodies than `BODIES`, is only read
 BODIES = 80
