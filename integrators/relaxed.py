@@ -73,7 +73,9 @@ def relax(
             return eps, found
         stiff[todo] = np.maximum(stiff[todo], np.abs(np.einsum("nii->ni", found.tangent[todo])).max(axis=1))
         change = -_solved(_block(found.tangent[todo], place, place), residual, 1e-13 * stiff[todo])
-        _search(evaluate, eps, found, todo, place, change, residual, size)
+        # a strain that runs away leaves the range of numbers; the step then says so by its status
+        with np.errstate(over="ignore", invalid="ignore"):
+            _search(evaluate, eps, found, todo, place, change, residual, size)
     found.status[todo[found.status[todo] == 0]] = int(Status.ITERATION_LIMIT)
     return eps, found
 
