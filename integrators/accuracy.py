@@ -158,17 +158,23 @@ class AccurateUpdate:
             return None
 
     def __call__(
-        self, driven: Any, state: Mapping[str, Any] | None = None, dt: float = 1.0, **values: Any
+        self,
+        driven: Any,
+        state: Mapping[str, Any] | None = None,
+        dt: float = 1.0,
+        *,
+        certify: bool = False,
+        **values: Any,
     ) -> StepResult:
         """See `Update.__call__`."""
-        out = self.inner(driven, state, dt, **values)
+        out = self.inner(driven, state, dt, certify=certify, **values)
         self.calls += 1
         if self.calls & (self.calls - 1) or self._trusted is None or len(out.status) == 0:
             return out
         if self._accepts(self.verify(out, state, dt, **values)):
             return out
         self.fallbacks += 1
-        out = self.exact(driven, state, dt, **values)
+        out = self.exact(driven, state, dt, certify=certify, **values)
         if not self._accepts(self.verify(out, state, dt, **values)):
             raise ConvergenceError(
                 f"law '{self.inner.law.name}': accuracy {self.choice.accuracy:g} asked, error {self.worst:.1e} found, and the exact "

@@ -131,6 +131,12 @@ def test_shipped_fronts_choose_the_laws_own_method():
         assert update.checks == 1 and update.fallbacks == 0 and update.worst <= 1e-8
 
 
+def test_a_call_may_be_certified_too():
+    update = von_mises.compile(accuracy=1e-8)
+    out = update(4e-3 * np.ones((3, 6)), None, certify=True, **VALUES)
+    assert update.checks == 1 and out.gap is not None and (out.gap >= 0.0).all()
+
+
 def test_calls_are_checked_ever_more_rarely():
     update = von_mises.compile(accuracy=1e-8)
     for _ in range(20):
