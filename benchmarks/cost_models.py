@@ -220,17 +220,15 @@ def child(kind, size, threads):
 
 def fitted(sizes, values):
     """log y = a + b log n: (a, b, half-width of the 95 % interval of b, what a new observation needs)."""
-    from scipy.stats import t
+    from scipy.stats import linregress, t
 
     x, y = np.log(np.asarray(sizes, dtype=float)), np.log(np.asarray(values, dtype=float))
-    n = len(x)
-    b = float(np.sum((x - x.mean()) * (y - y.mean())) / np.sum((x - x.mean()) ** 2))
-    a = float(y.mean() - b * x.mean())
-    spread = float(np.sqrt(np.sum((y - a - b * x) ** 2) / (n - 2))) if n > 2 else math.nan
-    quantile = float(t.ppf(0.975, n - 2)) if n > 2 else math.nan
-    width = quantile * spread / float(np.sqrt(np.sum((x - x.mean()) ** 2)))
-    return {"a": a, "b": b, "half": width, "mean": float(x.mean()), "sum": float(np.sum((x - x.mean()) ** 2)), "n": n, "spread": spread,
-            "t": quantile}  # fmt: skip
+    line, total = linregress(x, y), float(np.sum((x - x.mean()) ** 2))
+    quantile = float(t.ppf(0.975, len(x) - 2))
+    return {
+        "a": float(line.intercept), "b": float(line.slope), "half": quantile * float(line.stderr), "mean": float(x.mean()),
+        "sum": total, "n": len(x), "spread": float(line.stderr) * math.sqrt(total), "t": quantile,
+    }  # fmt: skip
 
 
 def foretold(model, size):

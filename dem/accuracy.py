@@ -14,7 +14,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +32,8 @@ from .scene import Scene
 from .slope_scene import SlopeScene
 
 __all__ = [
-    "MEASURES", "SceneChoice", "choose", "error_of", "features", "kind_of", "measures_of", "resolved", "scene_key", "tested", "with_choice",
+    "MEASURES", "SceneChoice", "choose", "error_of", "features", "kind_of", "measures_of", "resolved", "scene_key", "tested",
+    "with_setting",
 ]  # fmt: skip
 
 Array = NDArray[np.float64]
@@ -54,6 +55,7 @@ MEASURES = {
     },
 }
 ROWS = 60  # of a path at which curves are compared
+SWEEP_LIMIT = 50_000  # of a step at least, so that it is the tolerance that stops the sweeps
 
 
 def kind_of(scene: AnyScene) -> str:
@@ -81,11 +83,10 @@ def tested(scene: AnyScene, start: Assembly | None = None) -> dict[str, Any]:
 
 
 def _triaxial(scene: Scene, start: Assembly) -> dict[str, Any]:
-    from .run import triaxial_stage
+    from .run import triaxial_stage, walk
 
     test = triaxial_stage(start, scene.grains, scene.wires, scene.triaxial, scene.solve, scene.triaxial.pressure)
-    while not test.done:
-        test.advance()
+    walk(test)
     record = test.record(seed=scene.seed, settings={})
     stress, strain = record.wall_stress, record.wall_strain
     return {
@@ -110,14 +111,14 @@ def _length(assembly: Assembly, scene: Scene) -> float:
 
 def _motion(scene: MotionScene) -> dict[str, Any]:
     from .motion import MotionStage
+    from .run import walk
 
     stage = MotionStage(bodies_of(scene), scene)
     mass = stage.assembly.mass
     free = np.isfinite(mass)
     weight = np.where(free, mass, 0.0) / max(float(mass[free].sum()), np.finfo(float).tiny)
     first = weight @ stage.assembly.x
-    while not stage.done:
-        stage.advance()
+    walk(stage)
     frames = stage.frames
     lost = np.array(
         [
@@ -136,11 +137,11 @@ def _motion(scene: MotionScene) -> dict[str, Any]:
 
 
 def _slope(scene: SlopeScene) -> dict[str, Any]:
+    from .run import walk
     from .slope_scene import deposit_of, quality_of, repose_of, start_of
 
     stage = deposit_of(scene, start_of(scene))
-    while not stage.done:
-        stage.advance()
+    walk(stage)
     quality = quality_of(stage, repose_of(stage, scene))
     return {
         "angle": quality["angle"],
@@ -246,14 +247,12 @@ def choose(scene: AnyScene) -> SceneChoice:
     measure = next(iter(measures_of(scene)))
     kept = kept_front("scene", scene_key(scene))
     if kept is not None:
-        points = [p for p in kept.points if p.error is not None and "law" not in p.setting]
-        good = [p for p in points if (p.error or 0.0) <= accuracy]
-        if not good:
-            finest = min((p.error or 1.0 for p in points), default=1.0)
+        front = replace(kept, points=tuple(p for p in kept.points if "law" not in p.setting))
+        best = front.cheapest(accuracy)
+        if best is None:
             raise InputError(
-                f"accuracy = {accuracy:g}: the front measured for this scene ends at {finest:.1e}: ask for that, or for more grains"
+                f"accuracy = {accuracy:g}: the front measured for this scene ends at {front.finest:.1e}: ask for that, or for more grains"
             )
-        best = min(good, key=lambda p: p.cost)
         source = "the front measured on this machine for this scene"
         residual = 10.0 * float(best.figures.get("residual") or math.nan)
         return _choice(accuracy, measure, dict(best.setting), float(best.error or 0.0), residual, source, "")
@@ -377,28 +376,18 @@ def resolved(scene: AnyScene, run_file: Path | str) -> tuple[AnyScene, dict[str,
         if before is not None and before.get("accuracy") == scene.accuracy:
             residual = math.nan if before["residual"] is None else before["residual"]
             choice = SceneChoice(**(before | {"residual": residual}))
-            return with_choice(scene, choice), {"accuracy": choice.as_dict()}
+            return with_setting(scene, choice.setting), {"accuracy": choice.as_dict()}
     choice = choose(scene)
-    return with_choice(scene, choice), {"accuracy": choice.as_dict()}
+    return with_setting(scene, choice.setting), {"accuracy": choice.as_dict()}
 
 
-def with_choice(scene: AnyScene, choice: SceneChoice) -> AnyScene:
-    """The scene with the chosen step and tolerance."""
-    setting = choice.setting
-    if isinstance(scene, MotionScene):
-        return msgspec.structs.replace(
-            scene,
-            motion=msgspec.structs.replace(scene.motion, step=scene.motion.step * setting.get("step", 1.0)),
-            solve=msgspec.structs.replace(scene.solve, tolerance=setting["tolerance"]),
-        )
+def with_setting(scene: AnyScene, setting: Mapping[str, Any]) -> AnyScene:
+    """The scene with another tolerance, and step (of a motion times its own); with as many sweeps as it was measured with."""
+    change = msgspec.structs.replace
+    solve = change(scene.solve, tolerance=setting["tolerance"])
     if isinstance(scene, SlopeScene):
-        return msgspec.structs.replace(
-            scene, solve=msgspec.structs.replace(scene.solve, tolerance=setting["tolerance"])
-        )
-    solve = msgspec.structs.replace(
-        scene.solve,
-        tolerance=setting["tolerance"],
-        step=setting["step"],
-        sweep_limit=max(50_000, scene.solve.sweep_limit),
-    )
-    return msgspec.structs.replace(scene, solve=solve)
+        return change(scene, solve=solve)
+    solve = change(solve, sweep_limit=max(SWEEP_LIMIT, scene.solve.sweep_limit))
+    if isinstance(scene, MotionScene):
+        return change(scene, solve=solve, motion=change(scene.motion, step=scene.motion.step * setting["step"]))
+    return change(scene, solve=change(solve, step=setting["step"]))

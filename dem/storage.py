@@ -8,17 +8,15 @@ from __future__ import annotations
 import hashlib
 import io
 import json
-import os
 import platform
-import tempfile
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .. import __version__
-from ..cache import source_hash
-from ..errors import InputError, StorageError
+from ..cache import replace_file, source_hash
+from ..errors import InputError
 
 __all__ = ["UNITS", "load_run", "replace_file", "save_run"]
 
@@ -38,30 +36,6 @@ UNITS = {
     # count, Σx, Σu, Σx⊗x, Σu⊗x one after the other
     "grain_fit": "1, m, m2", "bead_fit": "1, m, m2",
 }  # fmt: skip
-
-
-def replace_file(path: Path | str, data: bytes) -> None:
-    """Write `data` so that `path` holds either its old or its new content, never a part; `StorageError` if it cannot."""
-    path = Path(path).resolve()  # through a link, so that the link stays one
-    temporary = None
-    if path.exists() and not path.is_file():
-        raise StorageError(f"{path}: is a folder or a device, not a file; choose a file name")
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
-        os.chmod(temporary, 0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
-        raise StorageError(
-            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: "
-            "free some space or choose another place"
-        ) from None
 
 
 _PROVENANCE = ("format", "program", "python", "conventions", "units", "versions", "machine", "source")

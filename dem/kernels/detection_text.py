@@ -6,7 +6,7 @@ __all__ = ["DETECTION"]
 
 DETECTION = '''
 @njit
-def find(x, radius, fixed, $chains skin, offsets, out):
+def find(x, radius, fixed$chains, skin, offsets, out):
     """Write pairs (i < j, sorted) with gap below the skin to `out`; returns how many there are, which may be more than fit."""
     count = x.shape[0]
     low = np.empty($dimension)

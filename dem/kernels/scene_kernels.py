@@ -336,7 +336,6 @@ def detection(dimension: int, wires: bool = False) -> Kernel:
     values = {
         "dimension": dimension,
         "components": ", ".join(f"c_{a}" for a in range(dimension)),
-        "chains": "wire, rank, apart," if wires else "",
+        "chains": ", wire, rank, apart" if wires else "",
     }
-    text = expand(DETECTION, dimension, {"wires": wires}, values).replace("fixed,  skin", "fixed, skin")
-    return Kernel("detection", text, Columns(()))
+    return Kernel("detection", expand(DETECTION, dimension, {"wires": wires}, values), Columns(()))

@@ -22,7 +22,7 @@ from typing import Any
 
 from .errors import StorageError
 
-__all__ = ["cache_folder", "content_hash", "load_text", "njit", "source_hash"]
+__all__ = ["cache_folder", "content_hash", "load_text", "njit", "replace_file", "source_hash"]
 
 _decorating = threading.RLock()
 
@@ -45,6 +45,30 @@ def cache_folder() -> Path:
     import platformdirs
 
     return Path(platformdirs.user_cache_dir("fenchel"))
+
+
+def replace_file(path: Path | str, data: bytes) -> None:
+    """Write `data` so that `path` holds either its old or its new content, never a part; `StorageError` if it cannot."""
+    path = Path(path).resolve()  # through a link, so that the link stays one
+    temporary = None
+    if path.exists() and not path.is_file():
+        raise StorageError(f"{path}: is a folder or a device, not a file; choose a file name")
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        handle, temporary = tempfile.mkstemp(dir=path.parent, prefix=f".{path.name}.")
+        with os.fdopen(handle, "wb") as file:
+            file.write(data)
+            file.flush()
+            os.fsync(file.fileno())
+        os.chmod(temporary, 0o644)
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise StorageError(
+            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: "
+            "free some space or choose another place"
+        ) from None
 
 
 def load_text(folder: str, name: str, text: Callable[[], str]) -> ModuleType:

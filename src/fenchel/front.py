@@ -13,14 +13,13 @@ import json
 import math
 import os
 import platform
-import tempfile
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any
 
-from .cache import cache_folder, content_hash
-from .errors import InputError, StorageError
+from .cache import cache_folder, content_hash, replace_file
+from .errors import InputError
 
 __all__ = ["Front", "Measured", "checked_accuracy", "environment", "fingerprint", "kept_front", "shipped_front"]
 
@@ -178,18 +177,7 @@ def keep_front(front: Front, key: str) -> Path:
 
 def write_json(path: Path, content: Any) -> None:
     """Write JSON, replaced atomically: a kill leaves the file of before. `StorageError` when the disk refuses."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "w", encoding="utf-8") as file:
-            json.dump(content, file, indent=1, ensure_ascii=False)
-            file.write("\n")
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise StorageError(
-            f"{path}: cannot be written ({error.strerror}): free some space or choose another place"
-        ) from error
+    replace_file(path, (json.dumps(content, indent=1, ensure_ascii=False) + "\n").encode())
 
 
 @functools.cache

@@ -10,7 +10,7 @@ from random_scenes import random_scene
 
 from fenchel.dem import accuracy as chosen
 from fenchel.dem import run_scene
-from fenchel.dem.accuracy import choose, error_of, features, fit_model, predicted, resolved, with_choice
+from fenchel.dem.accuracy import choose, error_of, features, fit_model, predicted, resolved, with_setting
 from fenchel.dem.motion import run_motion
 from fenchel.dem.motion_scene import LooseGrains, MotionKeys, MotionScene, PlaneKeys, check_motion_scene
 from fenchel.dem.scene import Grains, Scene, SceneSolve, SceneTriaxial, check_scene
@@ -187,7 +187,7 @@ def test_scenes_of_free_bodies_take_a_kept_front(monkeypatch, tmp_path):
     assert said["accuracy"]["residual"] is None  # nothing to hold the residual against
     content = run_motion(scene, tmp_path / "run.h5")
     assert content["quality"]["steps"] == pytest.approx(10, abs=1)
-    heap = with_choice(HEAP, choose(scene))
+    heap = with_setting(HEAP, choose(scene).setting)
     assert heap.solve.tolerance == 1e-4
 
 

@@ -2,26 +2,20 @@
 
 from __future__ import annotations
 
-import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
 
 from .laws import LAW
+from .progress import notice
 from .signs import SIGNS, Signs, turn_path
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
     from fenchel.integrators import Comparison, Run
 
-__all__ = ["notice", "register"]
-
-_QUIET = 2.0  # s before anything is told
-_PACE = 5.0  # s between two lines where there is no terminal
+__all__ = ["register"]
 
 
 def register(app: typer.Typer) -> None:
@@ -164,30 +158,3 @@ def _agreement(run: Run, condition: float | None) -> str:
 
 def _short(value: float | None) -> str:
     return "" if value is None else f"{value:.1e}"
-
-
-@contextmanager
-def notice() -> Iterator[Callable[[float, str], None]]:
-    """A function that tells what comes next, on standard error; silent for the first two seconds, a line now and then where there
-    is no terminal."""
-    start, shown, terminal = time.monotonic(), False, sys.stderr.isatty()
-    last = -_PACE
-
-    def tell(share: float, what: str) -> None:
-        nonlocal shown, last
-        now = time.monotonic()
-        if now - start < _QUIET or (not terminal and now - last < _PACE):
-            return
-        last = now
-        line = f"{share:4.0%}  {what}"
-        if terminal:
-            print(f"\r{line:<60}", end="", file=sys.stderr, flush=True)
-        else:
-            print(line, file=sys.stderr, flush=True)
-        shown = True
-
-    try:
-        yield tell
-    finally:
-        if shown and terminal:
-            print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)

@@ -1,4 +1,4 @@
-"""The bar of one run: stage, step, strain, residual, kinetic energy, time left. It goes to standard error."""
+"""Progress on standard error: the bar of one run (stage, step, strain, residual, kinetic energy, time left), and notices of what comes."""
 
 from __future__ import annotations
 
@@ -11,8 +11,10 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fenchel.dem import Progress
 
-__all__ = ["progress_bar"]
+__all__ = ["notice", "progress_bar"]
 
+_QUIET = 2.0  # s before a notice tells anything
+_PACE_OF_NOTICES = 5.0  # s between two notices where there is no terminal
 _PACE_OF_LINES = 15.0  # s between two lines where there is no terminal
 
 
@@ -60,3 +62,30 @@ def _told(progress: Progress) -> str:
         f"{progress.stage}  step {progress.step}  strain {progress.strain:+.3%}  "
         f"residual {progress.residual:.1e}  kinetic {progress.kinetic:.1e} J"
     )
+
+
+@contextmanager
+def notice() -> Iterator[Callable[[float, str], None]]:
+    """A function that tells what comes next, on standard error; silent for the first two seconds, a line now and then where there
+    is no terminal."""
+    start, shown, terminal = time.monotonic(), False, sys.stderr.isatty()
+    last = -_PACE_OF_NOTICES
+
+    def tell(share: float, what: str) -> None:
+        nonlocal shown, last
+        now = time.monotonic()
+        if now - start < _QUIET or (not terminal and now - last < _PACE_OF_NOTICES):
+            return
+        last = now
+        line = f"{share:4.0%}  {what}"
+        if terminal:
+            print(f"\r{line:<60}", end="", file=sys.stderr, flush=True)
+        else:
+            print(line, file=sys.stderr, flush=True)
+        shown = True
+
+    try:
+        yield tell
+    finally:
+        if shown and terminal:
+            print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)

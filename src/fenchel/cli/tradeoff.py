@@ -194,7 +194,7 @@ def _accuracies(
 def _told(quiet: bool) -> Any:
     from contextlib import nullcontext
 
-    from .compare import notice
+    from .progress import notice
 
     return nullcontext(None) if quiet else notice()
 
@@ -203,15 +203,16 @@ def _finish(
     fronts: list[Front], output: Path, wanted: Sequence[float], json_wanted: bool, more: dict[str, Any]
 ) -> None:
     """Write the files of a front, print the table or the JSON."""
+    from fenchel.cache import replace_file
     from fenchel.front import write_json
     from fenchel.tradeoff.figure import front_picture
-    from fenchel.tradeoff.report import content_of, sentences, write_bytes
+    from fenchel.tradeoff.report import content_of, sentences
 
     from .tables import print_json, print_table
 
     content = content_of(fronts, wanted) | more
     write_json(output / "front.json", content)
-    write_bytes(output / "front.svg", front_picture(fronts))
+    replace_file(output / "front.svg", front_picture(fronts))
     if json_wanted:
         print_json(content)
         return

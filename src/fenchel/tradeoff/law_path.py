@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import FenchelError
+from ..errors import DeclarationError, FenchelError
 from ..front import Front, Measured, environment
 from ..integrators.comparison_runs import follow_path
 from ..integrators.path_file import StrainStressPath
 from ..integrators.step_order import cut_path
 from ..potentials import Law
-from .law_step import _directions, flow_strain
+from .law_step import _directions, energy_scales, flow_strain
 
 __all__ = ["MEASURE", "measure_path"]
 
@@ -100,27 +100,20 @@ def _explicit(law: Law, path: StrainStressPath | None) -> bool:
     """Whether the explicit scheme takes the law, and the path is one of strains."""
     if path is not None and bool(np.any(path.control)):
         return False
-    return law.phi is None and law.observable not in law.forces and law.temperature is None and bool(law.internal)
+    try:
+        law.compile(solver="explicit")
+    except DeclarationError:
+        return False
+    return bool(law.internal)
 
 
 def _measured(setting: dict[str, Any], took: _Followed, truth: _Followed, scale: float) -> Measured:
-    rows = len(took.stress) if took.stress.ndim == 2 else took.stress.shape[1]
-
-    def part(array: Array) -> Array:
-        return (
-            array
-            if array.ndim < 2 and took.stress.ndim == 2
-            else array[..., :rows, :]
-            if array.ndim == 3
-            else array[:rows]
-        )
-
-    true = part(truth.stress)
-    size = max(float(np.abs(truth.energy).max(initial=0.0)), np.finfo(float).tiny)
-    lost = max(float(np.abs(truth.dissipation).max(initial=0.0)), 1e-3 * size)
-    energy, dissipation = (
-        (truth.energy, truth.dissipation) if took.stress.ndim == 2 else (truth.energy[:rows], truth.dissipation[:rows])
-    )
+    # the explicit scheme follows the first of the random paths only
+    count = len(took.energy)
+    true, energy, dissipation = truth.stress, truth.energy[:count], truth.dissipation[:count]
+    if true.ndim == 3:
+        true = true[:, :count]
+    size, lost = energy_scales(truth.energy, truth.dissipation)
     return Measured(
         setting=setting,
         cost=took.seconds,

@@ -216,8 +216,7 @@ def _measured(
     scale = max(_longest(true.stress), np.finfo(float).tiny)
     error = _longest(out.stress - true.stress[:count]) / scale
     energy = update.energy(own.eps, out.state, **own.values) if hasattr(update, "energy") else reference.energy[:count]
-    size = max(float(np.abs(reference.energy).max(initial=0.0)), np.finfo(float).tiny)
-    lost = max(float(np.abs(true.dissipation).max(initial=0.0)), 1e-3 * size)
+    size, lost = energy_scales(reference.energy, true.dissipation)
     figures: dict[str, float | None] = {
         "energy": _largest(energy - reference.energy[:count]) / size,
         "dissipation": _largest(out.dissipation - true.dissipation[:count]) / lost,
@@ -228,6 +227,12 @@ def _measured(
     bound = error_bound(trusted, update, out, own.state, own.dt, points=200, **own.values)
     figures["bound"] = float((bound.difference + bound.gap).max(initial=0.0))
     return Measured(setting=setting, cost=cost, error=error, figures=figures)
+
+
+def energy_scales(energy: Array, dissipation: Array) -> tuple[float, float]:
+    """What errors of energy and of dissipation are relative to: the largest of each, of dissipation at least a thousandth of the energy."""
+    size = max(_largest(energy), np.finfo(float).tiny)
+    return size, max(_largest(dissipation), 1e-3 * size)
 
 
 def _largest(difference: Array) -> float:

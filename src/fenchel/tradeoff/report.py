@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import os
-import tempfile
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
-from ..errors import StorageError
 from ..front import Front
 
-__all__ = ["content_of", "sentences", "write_bytes"]
+__all__ = ["content_of", "sentences"]
 
 
 def content_of(fronts: Sequence[Front], accuracies: Sequence[float]) -> dict[str, Any]:
@@ -41,18 +37,3 @@ def sentences(front: Front, accuracies: Sequence[float]) -> list[str]:
         else:
             found.append(f"for {accuracy:g}: {point.name} (error {point.error:.1e}, {point.cost:.3g} {front.cost})")
     return found
-
-
-def write_bytes(path: Path, data: bytes) -> None:
-    """Write a file, replaced atomically. `StorageError` when the disk refuses."""
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        handle, temporary = tempfile.mkstemp(dir=path.parent, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        Path(temporary).chmod(0o644)
-        os.replace(temporary, path)
-    except OSError as error:
-        raise StorageError(
-            f"{path}: cannot be written ({error.strerror}): free some space or choose another place"
-        ) from error

@@ -17,13 +17,13 @@ from typing import Any
 import msgspec
 
 from ..campaign import Computation, run_campaign
-from ..dem.accuracy import error_of, kind_of, measures_of, tested
+from ..dem.accuracy import error_of, kind_of, measures_of, tested, with_setting
 from ..dem.bodies import Assembly
 from ..dem.motion_scene import MotionScene
 from ..dem.scene import Scene
 from ..dem.slope_scene import SlopeScene
 from ..dem.storage import load_run
-from ..errors import FenchelError, InputError
+from ..errors import ConvergenceError, FenchelError, InputError
 from ..front import Front, Measured, environment
 
 __all__ = ["STEPS", "TOLERANCES", "measure_scene", "settings_of"]
@@ -32,7 +32,7 @@ AnyScene = Scene | MotionScene | SlopeScene
 STEPS = {"triaxial": (0.025, 0.05, 0.1, 0.2), "motion": (0.5, 1.0, 2.0, 4.0), "slope": ()}  # of a motion: times its own
 TOLERANCES = {"triaxial": (1e-6, 1e-5, 1e-4, 1e-3), "motion": (1e-7, 1e-6, 1e-5, 1e-4), "slope": (1e-4, 1e-3, 1e-2)}
 KAPPAS = (1e3, 1e4)  # k_n/(P d) of compliant contacts tried in place of rigid ones
-LIMIT = 50_000  # sweeps
+FRAMES = 50  # of a motion that are compared
 
 
 def settings_of(
@@ -56,31 +56,12 @@ def settings_of(
     return found + [middle | law for law in other]
 
 
-def _with_setting(scene: AnyScene, setting: Mapping[str, Any]) -> AnyScene:
-    """The scene under a setting."""
-    tolerance = setting["tolerance"]
-    if isinstance(scene, SlopeScene):
-        return msgspec.structs.replace(scene, solve=msgspec.structs.replace(scene.solve, tolerance=tolerance))
-    if isinstance(scene, MotionScene):
-        step = scene.motion.step * setting["step"]
-        return msgspec.structs.replace(
-            scene,
-            motion=msgspec.structs.replace(scene.motion, step=step, frames=min(scene.motion.frames, 50)),
-            solve=msgspec.structs.replace(
-                scene.solve, tolerance=tolerance, sweep_limit=max(LIMIT, scene.solve.sweep_limit)
-            ),
-        )
-    solve = msgspec.structs.replace(
-        scene.solve, tolerance=tolerance, step=setting["step"], sweep_limit=max(LIMIT, scene.solve.sweep_limit)
+def _with_law(scene: Scene, law: str) -> Scene:
+    """The scene with rigid contacts, or with compliant ones of a κ."""
+    stiff = (
+        None if law == "rigid" else float(law.rpartition(" ")[2]) * scene.triaxial.pressure * sum(scene.grains.radius)
     )
-    law = str(setting.get("law", ""))
-    grains = scene.grains
-    if law == "rigid":
-        grains = msgspec.structs.replace(grains, normal_stiffness=None)
-    elif law:
-        kappa = float(law.rpartition(" ")[2])
-        grains = msgspec.structs.replace(grains, normal_stiffness=kappa * scene.triaxial.pressure * sum(grains.radius))
-    return msgspec.structs.replace(scene, solve=solve, grains=grains)
+    return msgspec.structs.replace(scene, grains=msgspec.structs.replace(scene.grains, normal_stiffness=stiff))
 
 
 _KINDS = {"triaxial": Scene, "motion": MotionScene, "slope": SlopeScene}
@@ -89,14 +70,13 @@ _KINDS = {"triaxial": Scene, "motion": MotionScene, "slope": SlopeScene}
 def prepared_sample(kind: str, scene: dict[str, Any]) -> dict[str, Any]:
     """The sample of a triaxial scene at rest at its pressure, as arrays."""
     from ..dem.preparation import make_sample, preparation
+    from ..dem.run import walk
 
     whole = msgspec.convert(scene, _KINDS[kind])
     assert isinstance(whole, Scene)
     assembly = make_sample(whole.grains, whole.wires, whole.sample, whole.seed)
     for make in preparation(whole.grains, whole.wires, whole.sample, whole.solve, whole.triaxial.pressure):
-        stage = make(assembly)
-        while not stage.done:
-            stage.advance()
+        walk(make(assembly))
     return {"assembly": assembly.arrays()}
 
 
@@ -106,7 +86,12 @@ def one_run(kind: str, scene: dict[str, Any], setting: dict[str, Any], folder: P
     start = None
     if kind == "triaxial":
         start = Assembly.from_arrays(load_run(folder / "sample.h5")[0]["assembly"])
-    changed = _with_setting(whole, setting)
+    changed = with_setting(whole, setting)
+    if isinstance(changed, Scene) and "law" in setting:
+        changed = _with_law(changed, setting["law"])
+    if isinstance(changed, MotionScene):
+        frames = min(changed.motion.frames, FRAMES)
+        changed = msgspec.structs.replace(changed, motion=msgspec.structs.replace(changed.motion, frames=frames))
     began = time.process_time()
     try:
         found = tested(changed, start)
@@ -151,8 +136,6 @@ def measure_scene(
     found = [results[f"run {k}"] for k in range(len(references) + len(tries))]
     for k in (0, 1):
         if found[k]["failure"]:
-            from ..errors import ConvergenceError
-
             raise ConvergenceError(
                 f"{name}: the reference does not end ({found[k]['failure']}): nothing to measure against"
             )
