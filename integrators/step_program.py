@@ -250,17 +250,22 @@ def stacked(
 
 
 def _column_scale(P: Array, E: Array, G: Array) -> Array:
-    """Positive column scales that bring [P; E; G] near unit size (Ruiz), rows of E and G being free to scale."""
+    """Positive column scales that bring [P; E; G] near unit size (Ruiz), rows of E and G being free to scale.
+
+    Unknowns of no equality are measured by their own curvature: rows that are free to scale say nothing of it, and rates over a short
+    step would be lost beside strains. (In an equality such units could hide an unknown behind the rounding of the others.)
+    """
     n = P.shape[0]
     scale = np.ones(n)
+    curved = (np.diag(P) > 0.0) & ~E.any(axis=0)
+    scale[curved] = 1.0 / np.sqrt(np.diag(P)[curved])
     rows = np.vstack([E, G])
     left = np.ones(rows.shape[0])
     for _ in range(12):
         inside = np.abs(P * scale[:, None] * scale[None, :])
         outside = np.abs(rows * left[:, None] * scale[None, :])
         size = np.maximum(np.sqrt(inside.max(axis=0, initial=0.0)), outside.max(axis=0, initial=0.0))
-        size = np.where(size > 0.0, size, 1.0)
-        scale /= np.sqrt(size)
+        scale /= np.where((size > 0.0) & ~curved, np.sqrt(size), 1.0)
         outside = np.abs(rows * left[:, None] * scale[None, :])
         across = outside.max(axis=1, initial=0.0)
         left /= np.sqrt(np.where(across > 0.0, across, 1.0))

@@ -283,7 +283,8 @@ def test_all_methods_of_the_stress_formulation_agree(name, rng):
     sig = entry.law.compile()(eps, state, entry.worked.dt, **values).stress
     auto = entry.law.compile(formulation="stress")(sig, state, entry.worked.dt, **values)
     size = np.abs(auto.strain).max()
-    for solver, close in (("general", 1e-7), ("conic", 1e-7), ("cvxpy", 1e-4)):
+    # what cvxpy leaves of a power cone is the root of its tolerance: 8e-5 to 1e-4 of the strain, by the units of the program
+    for solver, close in (("general", 1e-7), ("conic", 1e-7), ("cvxpy", 3e-4)):
         update = entry.law.compile(formulation="stress", solver=solver)
         other = update(sig, state, entry.worked.dt, **values)
         assert update.solver == solver
