@@ -252,11 +252,15 @@ def check_path(path: tuple[float, ...], name: str) -> None:
         raise InputError(f"{name}: triaxial.strain_path goes beyond 20 %; the model is one of small strain")
 
 
-def check_pressure(pressure: float, key: str, name: str) -> None:
-    """A cohesionless sample needs a positive confining pressure."""
+def check_pressure(grains: Grains, pressure: float, key: str, name: str) -> None:
+    """A cohesionless sample needs a positive confining pressure, one that moves a grain within finite time."""
     if not pressure > 0.0:
         raise InputError(
             f"{name}: {key} = {pressure:g} Pa: grains without cohesion need a positive confining pressure, e.g. 5e4"
+        )
+    if math.isinf(grains.density / pressure):
+        raise InputError(
+            f"{name}: {key} = {pressure:g} Pa: the inertial time d √(ρ/P) is beyond the largest number; raise the pressure, e.g. 5e4"
         )
 
 
@@ -301,7 +305,7 @@ def check_scene(scene: Scene, name: str = "scene") -> Scene:
     check_finite(scene, name)
     check_accuracy(scene, name)
     check_bodies(scene.grains, scene.wires, scene.sample, name)
-    check_pressure(scene.triaxial.pressure, "triaxial.pressure", name)
+    check_pressure(scene.grains, scene.triaxial.pressure, "triaxial.pressure", name)
     check_soft(scene.grains, scene.triaxial.pressure, "triaxial.pressure", name)
     check_path(scene.triaxial.strain_path, name)
     check_sphere(scene.grains.count, scene.triaxial.sphere, scene.triaxial.strain_path, name)

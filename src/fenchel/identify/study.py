@@ -110,7 +110,7 @@ def check_study(study: Study, name: str = "study") -> Study:
         )
     for key in ("pressures", "held_out"):
         for pressure in getattr(study.triaxial, key):
-            check_pressure(pressure, f"triaxial.{key}", name)
+            check_pressure(study.grains, pressure, f"triaxial.{key}", name)
             check_soft(study.grains, pressure, f"triaxial.{key}", name)
     if len({f"{pressure:.5g}" for pressure in study.pressures}) < len(study.pressures):  # as run files are named
         raise InputError(
