@@ -13,7 +13,7 @@ finer accuracies are confirmed by the residual of E's optimality conditions inst
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
@@ -34,7 +34,7 @@ from .step_result import StepResult
 from .strain_energy import operator_matrices
 from .thermal import thermal_input
 
-__all__ = ["AccurateUpdate", "Bound", "Choice", "choose", "error_bound", "law_key"]
+__all__ = ["AccurateUpdate", "Bound", "Choice", "choose", "error_bound", "law_key", "path_bound"]
 
 Array = NDArray[np.float64]
 SAMPLE = 8  # points of a call that are checked
@@ -129,9 +129,9 @@ def _words(point: Measured, front: Front, accuracy: float, source: str) -> str:
 class AccurateUpdate:
     """A compiled step with the setting that was chosen for an accuracy; the same call as the step, and everything else that it has.
 
-    Calls 1, 2, 4, 8, … are checked at up to eight of their points, so that the checks of a long run cost next to nothing; `verify` checks a
-    call at will. Where a check fails the call is done again by the exact setting, and from then on so is every call: `.fallbacks` counts
-    them. `ConvergenceError` if that does not meet the accuracy either.
+    Calls 1, 2, 4, 8, … are checked at up to eight of their points, so that the checks of a long run cost next to nothing, a path that
+    `drive` follows at up to eight of its rows; `verify` checks a call at will. Where a check fails the call is done again by the exact
+    setting, and from then on so is every call: `.fallbacks` counts them. `ConvergenceError` if that does not meet the accuracy either.
     """
 
     inner: Any
@@ -167,15 +167,39 @@ class AccurateUpdate:
         **values: Any,
     ) -> StepResult:
         """See `Update.__call__`."""
-        out = self.inner(driven, state, dt, certify=certify, **values)
+
+        def step(update: Any) -> StepResult:
+            found: StepResult = update(driven, state, dt, certify=certify, **values)
+            return found
+
         self.calls += 1
-        if self.calls & (self.calls - 1) or self._trusted is None or len(out.status) == 0:
-            return out
-        if self._accepts(self.verify(out, state, dt, **values)):
+        if self.calls & (self.calls - 1):
+            return step(self.inner)
+        return self._confirmed(step, lambda out: self.verify(out, state, dt, **values), lambda out: len(out.status))
+
+    def follow(
+        self,
+        drive: Callable[[Any], Any],
+        initial_state: Mapping[str, Any] | None,
+        steps: Array,
+        **values: Any,
+    ) -> Any:
+        """`drive(update)`, the history of a path, checked in the steps of up to eight of its rows, evenly spread."""
+
+        def bound(history: Any) -> Bound:
+            assert self._trusted is not None
+            return path_bound(self._trusted, history, initial_state, steps, points=SAMPLE, **values)
+
+        return self._confirmed(drive, bound, lambda history: len(history.eps))
+
+    def _confirmed(self, run: Callable[[Any], Any], bound: Callable[[Any], Bound], size: Callable[[Any], int]) -> Any:
+        """What `run` gives of the chosen setting if its check confirms it, else of the exact one."""
+        out = run(self.inner)
+        if self._trusted is None or size(out) == 0 or self._accepts(bound(out)):
             return out
         self.fallbacks += 1
-        out = self.exact(driven, state, dt, certify=certify, **values)
-        if not self._accepts(self.verify(out, state, dt, **values)):
+        out = run(self.exact)
+        if not self._accepts(bound(out)):
             raise ConvergenceError(
                 f"law '{self.inner.law.name}': accuracy {self.choice.accuracy:g} asked, error {self.worst:.1e} found, and the exact "
                 "setting is no better: the data are too ill-conditioned for it; ask for less"
@@ -219,31 +243,101 @@ def error_bound(
     `trusted` is `GeneralUpdate.of(law, False)`; `out` is the answer of `update` from the old `state`. Raises `ConvergenceError` where the
     program finds no answer.
     """
-    law, shape = trusted.law, getattr(update, "dimension", SPACE)
+    shape = getattr(update, "dimension", SPACE)
     count = len(out.status)
-    rows = np.arange(count) if points is None else np.unique(np.linspace(0, count - 1, min(points, count)).astype(int))
-    heat, rest = thermal_input(law, values, count)
-    numbers = law.admissible_values(rest)
+    rows = _sample(count, points)
+    heat, rest = thermal_input(trusted.law, values, count)
     temperature = None
-    if law.temperature is not None:
+    if trusted.law.temperature is not None:
         temperature = np.broadcast_to(heat.temperature, (count,))[rows]
     assert out.strain is not None
     eps = shape.embedded(np.asarray(out.strain, dtype=float))[rows]
-    old = _old_rows(law, shape, state, count)[rows]
+    old = _old_rows(trusted.law, shape, state, count)[rows]
+    stress = np.asarray(out.stress, dtype=float)
+    return _bound(trusted, shape, eps, stress[rows], old, dt, rest, temperature, _largest(stress))
+
+
+def path_bound(
+    trusted: GeneralUpdate,
+    history: Any,
+    initial_state: Mapping[str, Any] | None,
+    steps: Array,
+    *,
+    points: int | None = None,
+    **values: Any,
+) -> Bound:
+    """The largest errors of the stress in steps of a path: of sampled rows of a `History`, each from the state of the row before.
+
+    `steps` [s] (n,) are the time steps; what an error of one row does to the rows after it is not in the bound.
+    """
+    law, packing = trusted.law, StatePacking.of(trusted.law)
+    count = len(history.eps)
+    named = {**history.state, law.observable.name: history.eps}
+    after = packing.pack({name: named[name] for name in packing.layout}, count)
+    before = np.vstack([packing.pack(initial_state, 1), after[:-1]])
+    heat, rest = thermal_input(law, values, count)
+    rows = _sample(count, points)
+    temperature = None if law.temperature is None else np.broadcast_to(heat.temperature, (count,))
+    scale = _largest(history.sig)
+    found = [
+        _bound(
+            trusted,
+            SPACE,
+            history.eps[[row]],
+            history.sig[[row]],
+            before[[row]],
+            float(steps[row]),
+            rest,
+            None if temperature is None else temperature[[row]],
+            scale,
+        )
+        for row in rows
+    ]
+    return Bound(
+        np.concatenate([b.difference for b in found]),
+        np.concatenate([b.gap for b in found]),
+        max((b.residual for b in found), default=0.0),
+    )
+
+
+def _sample(count: int, points: int | None) -> NDArray[np.intp]:
+    if points is None or points >= count:
+        return np.arange(count)
+    return np.unique(np.linspace(0, count - 1, points).astype(np.intp))
+
+
+def _largest(stress: Array) -> float:
+    return max(
+        float(np.sqrt((np.asarray(stress, dtype=float) ** 2).sum(axis=1)).max(initial=0.0)), np.finfo(float).tiny
+    )
+
+
+def _bound(
+    trusted: GeneralUpdate,
+    shape: Any,
+    eps: Array,
+    stress: Array,
+    old: Array,
+    dt: float,
+    values: Mapping[str, Any],
+    temperature: Array | None,
+    scale: float,
+) -> Bound:
+    """Errors of `stress` at points with the embedded strains `eps` and the packed old states `old`, relative to `scale` [Pa]."""
+    law = trusted.law
+    numbers = law.admissible_values(values)
     found = trusted.solve(eps, old, dt, numbers, temperature, tangent=False)
     if (found.status != 0).any():
         raise ConvergenceError(
             f"law '{law.name}': the cone program that checks the step finds no answer at {(found.status != 0).sum()} points"
         )
     best = found.slopes[:, list(shape.places)]
-    stress = np.asarray(out.stress, dtype=float)
     if stress.shape[1] < best.shape[1]:  # of a relaxed dimension the given components
         best = best[:, list(shape.given)]
-    scale = max(float(np.sqrt((stress**2).sum(axis=1)).max(initial=0.0)), np.finfo(float).tiny)
     known: dict[Any, Any] = {p: numbers[p.name] for p in law.parameters} | {law.observable: eps}
     stiffness = _stiffness(law, known, old, temperature)
-    difference = np.sqrt(((stress[rows] - best) ** 2).sum(axis=1)) / scale
-    gap = np.sqrt(2.0 * stiffness * np.maximum(solution_gap(found, len(rows)), 0.0)) / scale
+    difference = np.sqrt(((stress - best) ** 2).sum(axis=1)) / scale
+    gap = np.sqrt(2.0 * stiffness * np.maximum(solution_gap(found, len(eps)), 0.0)) / scale
     residual = max((float(natural_map(part).max(initial=0.0)) for part in found.parts), default=0.0)
     return Bound(difference, gap, residual)
 

@@ -79,10 +79,22 @@ def drive_arrays(
     strain for an update driven by the stress). An update without tangent (cvxpy, explicit) follows a path that leaves no component unknown.
     `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference) and are named in
     messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
+    An update for a wanted accuracy is checked in sampled rows.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
     if isinstance(update, AccurateUpdate):
-        update = update.inner
+        more: dict[str, Any] = {"trace": trace, "trace_targets": trace_targets, "initial_strain": initial_strain}
+        more |= {"initial_state": initial_state, "tolerance": tolerance, "times": times, "temperatures": temperatures}
+        named = dict(values)
+        if temperatures is not None and update.law.temperature is not None:
+            named[update.law.temperature.name] = temperatures
+        found: History = update.follow(
+            lambda one: drive_arrays(one, control, targets, values, **more),
+            initial_state,
+            time_steps(times, len(np.array(targets, ndmin=2))),
+            **named,
+        )
+        return found
     require_space(update, "drive")
     turned = _turned(update)
     plan = path_plan(control, targets, trace, trace_targets, turned)

@@ -68,7 +68,7 @@ class Step(Function):
 
 
 def tidy(expression: Any) -> Any:
-    """Write ⟨x⟩ H(x) as ⟨x⟩, and xⁿ⁺¹/x as xⁿ (the quotient would be 0/0 at zero)."""
+    """Write ⟨x⟩ H(x) as ⟨x⟩, xⁿ⁺¹/x as xⁿ and (cx)ⁿ⁺¹/x as c(cx)ⁿ (the quotients would be 0/0 at zero)."""
     if expression.is_Add:
         return expression.func(*(tidy(a) for a in expression.args))
     if not expression.is_Mul:
@@ -80,9 +80,24 @@ def tidy(expression: Any) -> Any:
     for part in kept:
         base, exponent = part.as_base_exp()
         exponents[base] = exponents.get(base, S.Zero) + exponent
+    _merge_multiples(exponents)
     if any(not e.is_number for e in exponents.values()):
         kept = [base**exponent for base, exponent in exponents.items()]
     return expression.func(*kept)
+
+
+def _merge_multiples(exponents: dict[Any, Any]) -> None:
+    """1/x into a power of cx, in place of a product kept as exponents by base."""
+    for base in [b for b, e in exponents.items() if e.is_integer and e.is_negative and b.free_symbols]:
+        for other in list(exponents):
+            if other == base or exponents[other].is_number or not base.free_symbols <= other.free_symbols:
+                continue
+            factor = other / base
+            if not factor.free_symbols & base.free_symbols:
+                exponent = exponents.pop(base)
+                exponents[other] += exponent
+                exponents[factor] = exponents.get(factor, S.Zero) - exponent
+                break
 
 
 class Positive(Atom):

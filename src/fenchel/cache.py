@@ -126,10 +126,37 @@ def _room(function: Callable[..., Any]) -> str:
     return parts[1] if len(parts) > 2 and parts[0] == "fenchel" else ""
 
 
+def _told_apart(function: Any) -> None:
+    """Give a closure a name of its own, by what it closes over.
+
+    numba names the symbol of a function by its qualified name and a counter of the process that compiled it. Two variants of a closure
+    that different processes compiled can share that name, and then a process that reads both from disk runs the one for the other.
+    """
+    if not function.__closure__:
+        return
+    parts = []
+    for name, cell in zip(function.__code__.co_freevars, function.__closure__, strict=True):
+        value = cell.cell_contents
+        called = getattr(
+            value, "py_func", value
+        )  # a compiled function goes by its name, which tells its own variants apart
+        if callable(called):
+            parts.append(f"{name}={called.__module__}.{called.__qualname__}")
+        elif isinstance(value, (bool, int, float, str, bytes, tuple, type(None))):
+            parts.append(f"{name}={value!r}")
+        else:
+            raise TypeError(
+                f"{function.__qualname__} closes over {name} of type {type(value).__name__}, which has no stable text"
+            )
+    function.__qualname__ += "_" + content_hash(*parts)
+
+
 def njit(function: Callable[..., Any] | None = None, /, *, folder: str = "", **options: Any) -> Any:
-    """`numba.njit` with the disk cache in a folder named by content (`folder` replaces the hash of our own sources)."""
+    """`numba.njit` with the disk cache in a folder named by content (`folder` replaces the hash of our own sources); variants of a
+    closure are told apart."""
     if function is None:
         return functools.partial(njit, folder=folder, **options)
+    _told_apart(function)
     import numba
     from numba.core import config as settings
 

@@ -98,7 +98,7 @@ def steps(case: dict[str, Any]) -> str:
         raise Failure(f"virgin state: {error}") from None
     judge_ = Judge(drawn, before, state, new)
     try:
-        answer, kept = stepped(update, new, state, drawn, certify=True)
+        answer, kept = stepped(update, new, state, drawn, certify=True, finite=not case["extreme"])
     except InputError as error:
         if not case["extreme"]:
             raise Failure(f"moderate values are refused: {error}") from None
@@ -142,13 +142,16 @@ def admissible(case: dict[str, Any]) -> None:
 
 
 def stepped(
-    update: Any, new: Any, state: Any, drawn: RandomLaw, *, certify: bool = False, points: Any = None
+    update: Any, new: Any, state: Any, drawn: RandomLaw, *, certify: bool = False, finite: bool = False
 ) -> tuple[Any, Any]:
-    """(answer, the points that have one): all points at once, then one by one where some are refused."""
+    """(answer, the points that have one): all points at once, then one by one where some are refused. If `finite`, a refusal because
+    numbers are not finite is a failure."""
     count = len(new)
     try:
         return update(new, state, drawn.dt, certify=certify, **drawn.given), np.arange(count)
     except ConvergenceError as error:
+        if finite and "not finite" in str(error):
+            raise Failure(f"moderate values, and {error}") from None
         foreseen(error)
     good = []
     for i in range(count):

@@ -80,3 +80,45 @@ def test_the_cache_folder_is_the_users_choice(tmp_path, monkeypatch):
     assert cache.cache_folder() == tmp_path
     monkeypatch.delenv("FENCHEL_CACHE")
     assert cache.cache_folder().name == "fenchel"
+
+
+VARIANTS = """
+from numba import float64, types
+from ..cache import njit
+
+signature = float64(float64)
+
+def variant(power, inner=None):
+    def raised(x):
+        y = x if inner is None else inner(x)
+        return y**power
+    return njit(raised, signature_or_function=signature)
+
+@njit
+def through(pointer, x):
+    return pointer(x)
+"""
+
+
+@pytest.mark.parametrize("nested", [False, True])
+def test_variants_compiled_by_different_processes_stay_apart_in_one(small, nested):
+    """numba names a symbol by the qualified name and a counter of the process: of two variants of a closure, each compiled as the same
+    function of its process, whoever read both from disk ran the one for the other."""
+    (small / "integrators" / "variants.py").write_text(VARIANTS)
+    made = "variant(1, variant({0}))" if nested else "variant({0})"
+
+    def values(*powers):
+        made_all = ", ".join(made.format(power) for power in powers)
+        code = (
+            "from fenchel.integrators.variants import through, variant\n"
+            f"made = [{made_all}]\n"
+            "print(*(int(through(f, 3.0)) for f in made), *(int(f(3.0)) for f in made))"
+        )
+        return subprocess.run(
+            [sys.executable, "-c", code], cwd=small.parent, capture_output=True, text=True, check=True, timeout=120
+        ).stdout.split()
+
+    assert values(2) == 2 * ["9"]
+    assert values(4) == 2 * ["81"]
+    assert values(2, 4) == 2 * ["9", "81"]
+    assert values(4, 2) == 2 * ["81", "9"]

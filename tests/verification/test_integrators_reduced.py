@@ -20,6 +20,7 @@ from fenchel.potentials import (
     inner,
     isotropic,
     norm,
+    parameter,
     parameters,
     pos,
     scalar,
@@ -543,3 +544,47 @@ def test_every_law_has_a_readable_module():
     assert names["surfaces_"](force, 0 * force, values)[0] == pytest.approx(2 * np.sqrt(2) - 2.0)
     strain = np.array([1e-3, 0, 0, 0, 0, 0])
     assert names["stress_"](strain, 0 * strain, 0 * strain, values) == pytest.approx(C_EL @ strain, rel=1e-12)
+
+
+# -- powers at zero ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("viscous", "written"), [(False, "ratio"), (True, "ratio"), (False, "power"), (False, "both"), (True, "both")]
+)
+@pytest.mark.parametrize("exponent", [0.35, 1.0, 1.7])
+def test_power_hardening_starts_from_a_virgin_state(exponent, viscous, written):
+    """Q (p/p₀)ⁿ has its own slope at p = 0: a quotient by p would be 0/0 there. p against the scalar equation of the radial return."""
+    eps, eps_p, p = sym_tensor("eps"), sym_tensor("eps_p"), scalar("p")
+    k, H, Q, n, p_0, m, s_0, rate = (parameter(q, lower=0) for q in "k H Q n p_0 m s_0 rate".split())
+    A, A_p = forces(eps_p, p)
+    excess = sqrt(3) / sqrt(2) * norm(dev(A)) + A_p - k
+    hardening = {
+        "ratio": Q * p_0 / (n + 1) * (p / p_0) ** (n + 1),
+        "power": Q * p_0 ** (-n) / (n + 1) * p ** (n + 1),
+        "both": H * p**2 / 2 + Q * p_0 / (n + 1) * (p / p_0) ** (n + 1),
+    }[written]
+    flow = rate * s_0 / (m + 1) * pos(excess / s_0) ** (m + 1) if viscous else indicator(excess)
+    psi = inner(dev(eps - eps_p), dev(eps - eps_p)) * G + K / 2 * tr(eps - eps_p) ** 2 + hardening
+    law = Law("powers", psi=psi, phi_star=flow, internal=(eps_p, p))
+    dt, v = 0.5, {"k": 4e3, "H": 3e5, "Q": 7e3, "n": exponent, "p_0": 1e-3, "m": 2.0, "s_0": 2e4, "rate": 0.3}
+    values = {q.name: v[q.name] for q in law.parameters}
+    strains = np.zeros((5, 6))
+    strains[:, 5] = 0.0, 1e-6, 5e-4, 2e-3, 1e-2
+    for solver in ("reduced", "general"):
+        out = law.compile(solver=solver)(strains, None, dt, **values)
+        for row, gamma in enumerate(strains[:, 5]):
+            trial = np.sqrt(1.5) * 2 * G * gamma
+
+            def excess_at(q, trial=trial):
+                linear = v["H"] * q if written == "both" else 0.0
+                return trial - 3 * G * q - v["k"] - linear - v["Q"] * (q / v["p_0"]) ** exponent
+
+            def miss(q):
+                if not viscous:
+                    return excess_at(q)
+                return dt * v["rate"] * max(excess_at(q) / v["s_0"], 0.0) ** v["m"] - q
+
+            true = brentq(miss, 0.0, trial / (3 * G), xtol=1e-16, rtol=1e-14) if trial > v["k"] else 0.0
+            assert out.state["p"][row] == pytest.approx(true, rel=1e-7, abs=1e-13), (solver, row)
+            assert out.stress[row, 5] == pytest.approx((trial - 3 * G * true) / np.sqrt(1.5), rel=1e-7, abs=1e-9)

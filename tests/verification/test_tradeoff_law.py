@@ -1,5 +1,7 @@
 """Fronts of laws and `accuracy=` of a law, held against a step written without fenchel."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from law_truth import TRUTHS
@@ -194,6 +196,44 @@ def test_a_path_is_driven_by_a_step_of_an_accuracy():
     control = [False] + [True] * 5
     found = drive_arrays(von_mises.compile(accuracy=1e-8), control, path, VALUES)
     assert np.array_equal(found.sig, drive_arrays(von_mises.compile(), control, path, VALUES).sig)
+
+
+@pytest.mark.parametrize("name", ["von_mises", "sand", "maxwell", "thermo_elasto_plastic", "mohr_coulomb"])
+def test_sampled_rows_of_a_path_are_checked(name):
+    entry = ENTRIES[name]
+    update = entry.law.compile(accuracy=1e-6)
+    path = np.zeros((30, 6))
+    path[:, 0] = -np.linspace(0, 3e-3, 30)
+    path[:, 5] = 1e-3 * np.sin(np.linspace(0, 6, 30))
+    more = {} if entry.law.temperature is None else {"temperatures": np.linspace(290.0, 330.0, 30)}
+    found = drive_arrays(update, [False] * 6, path, entry.values, times=np.linspace(0.0, 2.0, 30) ** 2, **more)
+    assert update.checks == 1 and update.fallbacks == 0 and update.worst <= 1e-8 and len(update.last.difference) == 8
+    assert np.isfinite(found.sig).all()
+
+
+@pytest.mark.parametrize("wrong", ["sig", "state"])
+def test_a_wrong_path_is_seen_and_done_again_exactly(wrong):
+    update = von_mises.compile(accuracy=1e-5)
+    update.inner = Broken(update.exact, 0.0)
+    path = np.zeros((20, 6))
+    path[:, 5] = 2e-2 * np.sin(np.linspace(0, 6, 20))  # with rows that unload, of which the stress depends on the past
+
+    def drive(one):
+        found = drive_arrays(update.exact, [False] * 6, path, VALUES)
+        if one is update.exact:
+            return found
+        if wrong == "sig":
+            return replace(found, sig=1.001 * found.sig)
+        # a path that keeps a wrong state: every row after it answers to the wrong past
+        return replace(found, state={name: 1.01 * value for name, value in found.state.items()})
+
+    found = update.follow(drive, None, np.ones(20), **VALUES)
+    assert update.fallbacks == 1 and update.checks == 2 and update.inner is update.exact
+    assert 5e-4 < update.worst < 0.3
+    assert np.array_equal(found.sig, drive_arrays(von_mises.compile(), [False] * 6, path, VALUES).sig)
+    update.exact = Broken(update.exact, 0.0)
+    with pytest.raises(ConvergenceError, match="too ill-conditioned"):
+        update.follow(lambda one: replace(found, sig=1.001 * found.sig), None, np.ones(20), **VALUES)
 
 
 @pytest.mark.parametrize(
