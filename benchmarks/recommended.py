@@ -55,13 +55,19 @@ def laws(first, last, points=100):
             continue
         for accuracy in wanted:
             update = drawn.law.compile(accuracy=accuracy)
-            out = update(load.eps, load.state, load.dt, **load.values)
+            cases[accuracy] += 1
+            try:
+                out = update(load.eps, load.state, load.dt, **load.values)
+            except FenchelError as problem:
+                print(seed, f"accuracy {accuracy:g} not met:", str(problem)[:160], flush=True)
+                continue
             setting = dict(update.choice.setting)
             point = next(p for p in front.points if dict(p.setting) == setting)
             good = [p for p in front.points if p.error is not None and p.error <= accuracy]
-            cases[accuracy] += 1
             bound = update.verify(out, load.state, load.dt, points=points, **load.values)
             met[accuracy] += bool(bound.confirms(accuracy))
+            if not bound.confirms(accuracy):
+                print(seed, f"accuracy {accuracy:g} not met by {update.solver}: {bound.difference.max():.1e}", flush=True)
             if point.error is not None and point.error <= accuracy:
                 ratios[accuracy].append(point.cost / min(p.cost for p in good))
     for accuracy in wanted:

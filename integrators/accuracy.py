@@ -13,6 +13,7 @@ finer accuracies are confirmed by the residual of E's optimality conditions inst
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -34,11 +35,15 @@ from .step_result import StepResult
 from .strain_energy import operator_matrices
 from .thermal import thermal_input
 
-__all__ = ["AccurateUpdate", "Bound", "Choice", "choose", "error_bound", "law_key", "path_bound"]
+__all__ = ["AccurateUpdate", "Bound", "Choice", "UncheckedWarning", "choose", "error_bound", "law_key", "path_bound"]
 
 Array = NDArray[np.float64]
 SAMPLE = 8  # points of a call that are checked
 RESIDUAL = 1e-11  # of the trusted answer, where its gap is below what double precision can show
+
+
+class UncheckedWarning(UserWarning):
+    """An answer that its own method calls converged could not be checked by the cone program."""
 
 
 @dataclass(frozen=True)
@@ -58,11 +63,12 @@ class Choice:
 @dataclass(frozen=True)
 class Bound:
     """Errors of the stress at checked points, relative: `difference` to the trusted answer, `gap` bound of the latter's own error (n,),
-    `residual` of its optimality conditions."""
+    `residual` of its optimality conditions; `unanswered` more points, of which the trusted engine has no answer."""
 
     difference: Array
     gap: Array
     residual: float
+    unanswered: int = 0
 
     def confirms(self, accuracy: float) -> bool:
         """True if no checked point errs more."""
@@ -131,7 +137,8 @@ class AccurateUpdate:
 
     Calls 1, 2, 4, 8, … are checked at up to eight of their points, so that the checks of a long run cost next to nothing, a path that
     `drive` follows at up to eight of its rows; `verify` checks a call at will. Where a check fails the call is done again by the exact
-    setting, and from then on so is every call: `.fallbacks` counts them. `ConvergenceError` if that does not meet the accuracy either.
+    setting, and from then on so is every call: `.fallbacks` counts them. `ConvergenceError` if that does not meet the accuracy either,
+    `UncheckedWarning` where the cone program has no answer to check by.
     """
 
     inner: Any
@@ -195,7 +202,16 @@ class AccurateUpdate:
     def _confirmed(self, run: Callable[[Any], Any], bound: Callable[[Any], Bound], size: Callable[[Any], int]) -> Any:
         """What `run` gives of the chosen setting if its check confirms it, else of the exact one."""
         out = run(self.inner)
-        if self._trusted is None or size(out) == 0 or self._accepts(bound(out)):
+        if self._trusted is None or size(out) == 0:
+            return out
+        try:
+            accepted = self._accepts(bound(out))
+        except ConvergenceError as problem:
+            # the step has converged by its own method; that nobody could check it must not go unsaid
+            self.unchecked = str(problem)
+            warnings.warn(f"{problem}: this answer is not checked", UncheckedWarning, stacklevel=3)
+            return out
+        if accepted:
             return out
         self.fallbacks += 1
         out = run(self.exact)
@@ -225,7 +241,7 @@ class AccurateUpdate:
         """The error of a step that was made from `state`, at up to `points` of its points, evenly spread."""
         if self._trusted is None:
             raise InputError(self.unchecked)
-        return error_bound(self._trusted, self.inner, out, state, dt, points=points, **values)
+        return error_bound(self._trusted, self.inner, out, state, dt, points=points, partial=True, **values)
 
 
 def error_bound(
@@ -236,12 +252,13 @@ def error_bound(
     dt: float = 1.0,
     *,
     points: int | None = None,
+    partial: bool = False,
     **values: Any,
 ) -> Bound:
     """The error of the stress of a step of any method, formulation and dimension, bounded by the cone program's answer and its gap.
 
     `trusted` is `GeneralUpdate.of(law, False)`; `out` is the answer of `update` from the old `state`. Raises `ConvergenceError` where the
-    program finds no answer.
+    program finds no answer, if `partial` only where it finds none at all.
     """
     shape = getattr(update, "dimension", SPACE)
     count = len(out.status)
@@ -254,7 +271,7 @@ def error_bound(
     eps = shape.embedded(np.asarray(out.strain, dtype=float))[rows]
     old = _old_rows(trusted.law, shape, state, count)[rows]
     stress = np.asarray(out.stress, dtype=float)
-    return _bound(trusted, shape, eps, stress[rows], old, dt, rest, temperature, _largest(stress))
+    return _bound(trusted, shape, eps, stress[rows], old, dt, rest, temperature, _largest(stress), partial)
 
 
 def path_bound(
@@ -268,7 +285,8 @@ def path_bound(
 ) -> Bound:
     """The largest errors of the stress in steps of a path: of sampled rows of a `History`, each from the state of the row before.
 
-    `steps` [s] (n,) are the time steps; what an error of one row does to the rows after it is not in the bound.
+    `steps` [s] (n,) are the time steps; what an error of one row does to the rows after it is not in the bound. Raises `ConvergenceError`
+    where the program finds an answer at none of them.
     """
     law, packing = trusted.law, StatePacking.of(trusted.law)
     count = len(history.eps)
@@ -279,24 +297,21 @@ def path_bound(
     rows = _sample(count, points)
     temperature = None if law.temperature is None else np.broadcast_to(heat.temperature, (count,))
     scale = _largest(history.sig)
-    found = [
-        _bound(
-            trusted,
-            SPACE,
-            history.eps[[row]],
-            history.sig[[row]],
-            before[[row]],
-            float(steps[row]),
-            rest,
-            None if temperature is None else temperature[[row]],
-            scale,
-        )
-        for row in rows
-    ]
+    found, failed = [], None
+    for row in rows:
+        heat_here = None if temperature is None else temperature[[row]]
+        at = history.eps[[row]], history.sig[[row]], before[[row]], float(steps[row]), rest, heat_here
+        try:
+            found.append(_bound(trusted, SPACE, *at, scale, False))
+        except ConvergenceError as problem:
+            failed = problem
+    if failed is not None and not found:
+        raise failed
     return Bound(
         np.concatenate([b.difference for b in found]),
         np.concatenate([b.gap for b in found]),
         max((b.residual for b in found), default=0.0),
+        len(rows) - len(found),
     )
 
 
@@ -322,14 +337,17 @@ def _bound(
     values: Mapping[str, Any],
     temperature: Array | None,
     scale: float,
+    partial: bool,
 ) -> Bound:
-    """Errors of `stress` at points with the embedded strains `eps` and the packed old states `old`, relative to `scale` [Pa]."""
+    """Errors of `stress` at points with the embedded strains `eps` and the packed old states `old`, relative to `scale` [Pa]; if
+    `partial`, of those of which the program has an answer."""
     law = trusted.law
     numbers = law.admissible_values(values)
     found = trusted.solve(eps, old, dt, numbers, temperature, tangent=False)
-    if (found.status != 0).any():
+    answered = found.status == 0
+    if not (answered.any() if partial else answered.all()):
         raise ConvergenceError(
-            f"law '{law.name}': the cone program that checks the step finds no answer at {(found.status != 0).sum()} points"
+            f"law '{law.name}': the cone program that checks the step finds no answer at {(~answered).sum()} of {len(eps)} points"
         )
     best = found.slopes[:, list(shape.places)]
     if stress.shape[1] < best.shape[1]:  # of a relaxed dimension the given components
@@ -338,8 +356,10 @@ def _bound(
     stiffness = _stiffness(law, known, old, temperature)
     difference = np.sqrt(((stress - best) ** 2).sum(axis=1)) / scale
     gap = np.sqrt(2.0 * stiffness * np.maximum(solution_gap(found, len(eps)), 0.0)) / scale
-    residual = max((float(natural_map(part).max(initial=0.0)) for part in found.parts), default=0.0)
-    return Bound(difference, gap, residual)
+    residual = max(
+        (float(natural_map(part)[answered[part.points]].max(initial=0.0)) for part in found.parts), default=0.0
+    )
+    return Bound(difference[answered], gap[answered], residual, int((~answered).sum()))
 
 
 def _old_rows(law: Law, shape: Any, state: Mapping[str, Any] | None, count: int) -> Array:

@@ -556,7 +556,7 @@ def test_every_law_has_a_readable_module():
 def test_power_hardening_starts_from_a_virgin_state(exponent, viscous, written):
     """Q (p/p₀)ⁿ has its own slope at p = 0: a quotient by p would be 0/0 there. p against the scalar equation of the radial return."""
     eps, eps_p, p = sym_tensor("eps"), sym_tensor("eps_p"), scalar("p")
-    k, H, Q, n, p_0, m, s_0, rate = (parameter(q, lower=0) for q in "k H Q n p_0 m s_0 rate".split())
+    k, H, Q, n, p_0, m, s_0, rate = (parameter(q, lower=0) for q in ["k", "H", "Q", "n", "p_0", "m", "s_0", "rate"])
     A, A_p = forces(eps_p, p)
     excess = sqrt(3) / sqrt(2) * norm(dev(A)) + A_p - k
     hardening = {

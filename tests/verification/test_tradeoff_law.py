@@ -10,7 +10,7 @@ from random_laws import random_law
 from fenchel.errors import ConvergenceError, FenchelError, InputError
 from fenchel.front import Front, Measured, keep_front
 from fenchel.integrators import drive_arrays
-from fenchel.integrators.accuracy import Choice, error_bound, law_key
+from fenchel.integrators.accuracy import Choice, UncheckedWarning, error_bound, law_key
 from fenchel.integrators.general_update import GeneralUpdate
 from fenchel.potentials.library import ENTRIES, von_mises
 from fenchel.tradeoff.law_path import measure_path
@@ -234,6 +234,40 @@ def test_a_wrong_path_is_seen_and_done_again_exactly(wrong):
     update.exact = Broken(update.exact, 0.0)
     with pytest.raises(ConvergenceError, match="too ill-conditioned"):
         update.follow(lambda one: replace(found, sig=1.001 * found.sig), None, np.ones(20), **VALUES)
+
+
+class Silent:
+    """A trusted engine that has no answer at some points."""
+
+    def __init__(self, trusted, lost):
+        self.trusted, self.lost = trusted, lost
+
+    def __getattr__(self, name):
+        return getattr(self.trusted, name)
+
+    def solve(self, *arguments, **options):
+        found = self.trusted.solve(*arguments, **options)
+        found.status[self.lost] = 1
+        found.slopes[self.lost] = np.nan
+        return found
+
+
+def test_points_that_nobody_can_check_are_told():
+    eps = 4e-3 * np.random.default_rng(2).normal(size=(6, 6))
+    update = von_mises.compile(accuracy=1e-8)
+    update.__dict__["_trusted"] = Silent(GeneralUpdate.of(von_mises, False), [1, 4])
+    update(eps, None, **VALUES)
+    assert update.last.unanswered == 2 and len(update.last.difference) == 4 and update.last.confirms(1e-8)
+    update = von_mises.compile(accuracy=1e-8)
+    update.__dict__["_trusted"] = Silent(GeneralUpdate.of(von_mises, False), slice(None))
+    with pytest.warns(UncheckedWarning, match="not checked"):
+        out = update(eps, None, **VALUES)
+    assert np.isfinite(out.stress).all() and "no answer at 6 of 6" in update.unchecked
+    path = np.outer(np.linspace(0, 1, 5), eps[0])
+    with pytest.warns(UncheckedWarning, match="not checked"):
+        drive_arrays(update, [False] * 6, path, VALUES)
+    with pytest.raises(ConvergenceError, match="no answer"):
+        error_bound(Silent(GeneralUpdate.of(von_mises, False), [0]), update, out, None, **VALUES)
 
 
 @pytest.mark.parametrize(
