@@ -60,7 +60,7 @@ def natural_units(
     while free.shape[1]:
         known = plain & (blocks > 0.0)
         if not known.any():
-            known = plain & (_block_norms(G @ free, cones) > 0.0)
+            known = plain & (_block_norms(_images(G, free), cones) > 0.0)
             blocks[known] = 1.0
         found, free = _normalised(G[known] / blocks[known, None], free)
         if not found.shape[1]:
@@ -84,7 +84,7 @@ def natural_units(
 
 def _normalised(G: Array, free: Array) -> tuple[Array, Array]:
     """Directions of span(free) with orthonormal images under G, and an orthonormal basis of those without image."""
-    images = G @ free
+    images = _images(G, free)
     if not images.size:
         return free[:, :0], free
     _, s, vt = np.linalg.svd(images)

@@ -279,7 +279,10 @@ def _method(
                         S[i, j] = value
                     if S[i, i] > 0.0:
                         if i == 0 and soft:
-                            miss = f[0] - result[2] if turn > 0 and f[0] > 0.0 else (0.0 if f[0] <= 0.0 else math.inf)
+                            # a multiplier belongs to its overstress also where a step has gone past it, to f ≤ 0
+                            miss = 0.0
+                            if f[0] > 0.0 or gamma[0] > 0.0:
+                                miss = f[0] - result[2] if turn > 0 else math.inf
                         else:
                             miss = min(-f[i], gamma[i] * S[i, i])
                         missed = max(missed, abs(miss) / math.sqrt(S[i, i]))

@@ -234,7 +234,9 @@ def _method(
                     inverse = 1.0 / gram if gram > 0.0 else 1.0
                     root = math.sqrt(inverse)
                     if soft:
-                        missed = abs(max(out[0], 0.0) - overstress) * root if turn > 1 else math.inf
+                        # a multiplier belongs to its overstress also where a step has gone past it, to f ≤ 0
+                        excess = out[0] if weight > 0.0 else max(out[0], 0.0)
+                        missed = abs(excess - overstress) * root if turn > 1 else math.inf
                         soft_root(base, gram if gram > 1e-15 * across else 0.0, out, powers, result)
                         multiplier, rate, overstress = result[0], result[1], result[2]
                     else:

@@ -250,26 +250,37 @@ def stacked(
 
 
 def _column_scale(P: Array, E: Array, G: Array) -> Array:
-    """Positive column scales that bring [P; E; G] near unit size (Ruiz), rows of E and G being free to scale.
+    """Positive column scales that bring [P; E; G] near unit size, rows of E and G being free to scale.
 
-    Unknowns of no equality are measured by their own curvature: rows that are free to scale say nothing of it, and rates over a short
-    step would be lost beside strains. (In an equality such units could hide an unknown behind the rounding of the others.)
+    First the logarithms of all entries by least squares (Curtis and Reid, 1972), with those of the curvatures, which have no row to
+    scale: a unit that several unknowns share shows only in rows that tie them to others (a multiplier by a strength of 1e9 Pa, a rate over
+    a short step). Then largest entries in turn (Ruiz, 2001).
     """
-    n = P.shape[0]
-    scale = np.ones(n)
-    curved = (np.diag(P) > 0.0) & ~E.any(axis=0)
-    scale[curved] = 1.0 / np.sqrt(np.diag(P)[curved])
     rows = np.vstack([E, G])
+    scale = _geometric_scale(np.diag(P), rows)
     left = np.ones(rows.shape[0])
     for _ in range(12):
         inside = np.abs(P * scale[:, None] * scale[None, :])
         outside = np.abs(rows * left[:, None] * scale[None, :])
-        size = np.maximum(np.sqrt(inside.max(axis=0, initial=0.0)), outside.max(axis=0, initial=0.0))
-        scale /= np.where((size > 0.0) & ~curved, np.sqrt(size), 1.0)
-        outside = np.abs(rows * left[:, None] * scale[None, :])
         across = outside.max(axis=1, initial=0.0)
-        left /= np.sqrt(np.where(across > 0.0, across, 1.0))
+        left /= np.where(across > 0.0, across, 1.0)
+        outside = np.abs(rows * left[:, None] * scale[None, :])
+        size = np.maximum(np.sqrt(inside.max(axis=0, initial=0.0)), outside.max(axis=0, initial=0.0))
+        scale /= np.sqrt(np.where(size > 0.0, size, 1.0))
     return scale
+
+
+def _geometric_scale(curvature: Array, rows: Array) -> Array:
+    """exp c with least Σ (log |a_ij| + r_i + c_j)² over the entries of the rows plus Σ (½ log P_jj + c_j)² over the curvatures."""
+    m, n = rows.shape
+    i, j = np.nonzero(rows)
+    curved = np.flatnonzero(curvature > 0.0)
+    system = np.zeros((len(i) + len(curved), m + n))
+    entries = np.arange(len(i))
+    system[entries, i] = system[entries, m + j] = 1.0
+    system[len(i) + np.arange(len(curved)), m + curved] = 1.0
+    known = np.concatenate([np.log(np.abs(rows[i, j])), 0.5 * np.log(curvature[curved])])
+    return np.exp(np.linalg.lstsq(system, -known, rcond=None)[0][m:])
 
 
 def _costed(P: Array, E: Array, G: Array, cones: tuple[Cone, ...]) -> NDArray[np.bool_]:
