@@ -29,7 +29,7 @@ __all__ = ["TOLERANCES", "SolverChoice", "choose_solver", "features", "probe"]
 TOLERANCES = (1e-2, 1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10)
 EARLY, LATE = 10, 30  # sweeps of the probe
 # decades (of the friction: its own size) at which likeness fades; from leaving out one of the shipped problems at a time
-WIDTHS = {"contacts": 0.13, "friction": 0.19, "early": 0.7, "late": 0.9}
+WIDTHS = {"contacts": 0.13, "friction": 0.19, "early": 0.7, "late": 0.9, "rough": 0.5}
 PATIENCE, LEAST = 10.0, 0.05  # times the expected seconds, and seconds, before `auto` takes over
 
 
@@ -77,6 +77,7 @@ def _coordinates(row: Mapping[str, float]) -> np.ndarray:
         "friction": min(row["friction"], 1.5),
         "early": math.log10(early),
         "late": math.log10(late),
+        "rough": float(row["friction"] > 0.0),  # contacts without friction are another kind of problem, not a limit
     }
     return np.array([found[name] / width for name, width in WIDTHS.items()])
 
