@@ -20,7 +20,7 @@ from ..potentials import Law
 from ..potentials.spectral import as_matrix, from_matrix
 from .batch import ROUNDING, BatchSolution, interior_start, slopes_of, solve_batch
 from .cone_projection import EXPONENTIAL, EXPONENTIAL_DUAL, ORTHANT, POWER, POWER_DUAL, SECOND_ORDER, SEMIDEFINITE
-from .general_step import GeneralStep, StepSolution
+from .general_step import GeneralStep, Part, StepSolution
 from .step_program import StepProgram
 
 __all__ = ["ConicSolution", "ConicStep", "conic_step", "reference"]
@@ -240,7 +240,9 @@ def reference(
     n = len(eps)
     slopes, increment = np.zeros((n, 6 + old.shape[1])), np.zeros((n, step.program_size))
     residual, status = np.zeros(n), np.zeros(n, dtype=np.int64)
+    parts = []
     for points, program, data in step.groups(eps, old, temperature):
+        left = np.zeros((len(data), program.p.size)), np.zeros((len(data), program.h0.size))
         for row, i in enumerate(np.arange(n)[points]):
             given = declare(step.law, update, program, data[row : row + 1], eps[i : i + 1], old[i : i + 1])
             y, multipliers, said = given.unpolished(tol_gap_abs=tolerance, tol_gap_rel=tolerance, tol_feas=tolerance)
@@ -255,4 +257,15 @@ def reference(
             if not step.stress:
                 slopes[i, :6] = -given.strain_constraint.dual_value * given.size / given.strain_unit
             increment[i] = program.increments(data[row : row + 1], y[None])[0]
-    return StepSolution(slopes, None, increment, residual, status, np.zeros(n, dtype=np.int64), [])
+            left[0][row], left[1][row] = y, multipliers
+        parts.append(Part(points, program, data, _as_left(program, *left, slopes[points], residual[points], status[points])))
+    return StepSolution(slopes, None, increment, residual, status, np.zeros(n, dtype=np.int64), parts)
+
+
+def _as_left(
+    program: StepProgram, y: Array, multipliers: Array, slopes: Array, residual: Array, status: NDArray[np.int64]
+) -> BatchSolution:
+    """Unknowns and multipliers as another solver left them, in the compact form, for the certificates."""
+    small, dual = program.compact.start(y, multipliers)
+    zero = np.zeros(len(y), dtype=np.int64)
+    return BatchSolution(small, dual, slopes, None, residual, status, zero, zero, zero)

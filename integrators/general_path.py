@@ -111,9 +111,12 @@ def follow(
         if whole < 0.0:
             # the size that the path has in all, so that a row of zeros is not asked for digits that rounding does not leave
             whole = max(float(np.abs(goal).max(initial=0.0)), float(np.abs(out.tangent).max() * np.abs(base).max()))
+        first = float(np.abs(out.answer).max())
         for turn in range(TURNS):
             gap = v @ out.answer - goal[row]
             level = max(float(np.abs(out.answer).max()), float(np.abs(goal[row]).max(initial=0.0)))
+            # an answer that has to vanish (free thermal expansion) is measured by what the row began with, and what cancels in it
+            level = max(level, min(first, float(np.abs(out.tangent).max() * np.abs(trial).max())))
             level = max(level, 1e-3 * highest, 1e-3 * whole)
             size = float(np.abs(gap).max(initial=0.0))
             if out.status != 0:

@@ -106,7 +106,7 @@ def _drive(
                 trial[i] += z[i, k] * along / part
         done = False
         turns, cut = 0, 0
-        level, before, slope = 0.0, -1.0, 0.0
+        level, before, slope, first = 0.0, -1.0, 0.0, 0.0
         low, up, factor = 0.0, -1.0, 1.0
         # one evaluation per pass; `before` < 0 marks the first one of a step, which is always taken
         while turns < limit:
@@ -116,11 +116,14 @@ def _drive(
                 coefficients[row : row + 1], plan,
             )  # fmt: skip
             status, lost = status_row[0], loss_row[0]
-            scale, strain, now, along = 0.0, 0.0, 0.0, 0.0
+            scale, strain, now, along, here = 0.0, 0.0, 0.0, 0.0, 0.0
             for i in range(6):
                 scale = max(scale, abs(sig[i]))
                 strain = max(strain, abs(trial[i]))
-                stiff = max(stiff, abs(tangent[i, i]))
+                here = max(here, abs(tangent[i, i]))
+            stiff = max(stiff, here)
+            if turns == 0 and status == 0:
+                first = scale
             for k in range(size):
                 value = -goal[n, k]
                 scale = max(scale, abs(goal[n, k]))
@@ -153,7 +156,8 @@ def _drive(
                 if status != 0:
                     break
                 # rounding of stiffness times strain bounds what can be reached, but a runaway strain must not excuse a residual
-                level = max(scale, 1e-3 * highest)
+                # a stress that has to vanish (free thermal expansion) is measured by what the row began with, and what cancels in it
+                level = max(scale, 1e-3 * highest, min(first, here * strain))
                 before = now
                 if now <= max(tolerance * level, min(4e-15 * stiff * strain, 1e-8 * level)):
                     done = True

@@ -595,3 +595,17 @@ def test_tangent_of_an_elastic_step_at_coinciding_principal_values():
     unit = np.array([1.0, 1, 1, 0, 0, 0])
     stiffness = E / (1 + nu) * (np.eye(6) + nu / (1 - 2 * nu) * np.outer(unit, unit))
     assert np.abs(out.tangent - stiffness).max() <= 1e-12 * stiffness.max()
+
+
+@pytest.mark.parametrize("name", ["von_mises", "cam_clay"])
+def test_the_gap_of_the_route_by_cvxpy_is_that_of_its_own_answer(name):
+    """|σ − σ*| ≤ √(2 L δ), L the stiffness: an answer that errs by 1e-8 of the stress cannot have the gap zero."""
+    entry = ENTRIES[name]
+    values = dict(entry.values)
+    eps = 3e-3 * np.random.default_rng(1).normal(size=(4, 6)) - 1e-3 * np.array([1.0, 1, 1, 0, 0, 0])
+    exact = entry.law.compile()(eps, None, entry.worked.dt, **values)
+    rough = entry.law.compile(solver="cvxpy")(eps, None, entry.worked.dt, certify=True, **values)
+    stiffness = np.linalg.eigvalsh(entry.law.compile()(0 * eps, None, entry.worked.dt, **values).tangent).max()
+    error = np.linalg.norm(rough.stress - exact.stress, axis=1)
+    assert (error > 0.0).any() and (rough.gap > 0.0).all()
+    assert (error <= np.sqrt(2 * stiffness * rough.gap)).all()

@@ -5,7 +5,7 @@ import pytest
 
 from fenchel.integrators import drive, drive_arrays
 from fenchel.potentials import lame, parameters
-from fenchel.potentials.library import drucker_prager, reinforced_sand, sand, texsol, von_mises
+from fenchel.potentials.library import ENTRIES, drucker_prager, reinforced_sand, sand, texsol, von_mises
 
 SAND = {"E_s": 12e6, "nu_s": 0.2, "theta_f": 0.079, "C_0": 2842.0, "H_k": 944e3, "H_i": 472e3}
 UNIAXIAL = [True, True, False, True, True, True]
@@ -168,3 +168,19 @@ def test_a_path_by_the_conic_program_equals_the_closed_form(tmp_path):
     assert np.abs(conic.eps - closed.eps).max() <= 1e-9
     assert conic.psi == pytest.approx(closed.psi, rel=1e-6, abs=1e-9)
     assert conic.dissipation == pytest.approx(closed.dissipation, rel=1e-6, abs=1e-9)
+
+
+@pytest.mark.parametrize("solver", ["auto", "general"])
+@pytest.mark.parametrize("rows", [1, 10])
+def test_free_thermal_expansion_leaves_no_stress(solver, rows):
+    """ε = α (T − T₀) 𝕀 and σ = 0: the stress that is found is rounding, and must not be the measure of itself."""
+    entry = ENTRIES["thermo_elasto_plastic"]
+    values = dict(entry.values)
+    update = entry.law.compile(solver=solver)
+    ends = np.linspace(250.0, 450.0, 41 if solver == "auto" else 5)
+    for end in ends:
+        heat = np.linspace(values["T_0"], end, rows + 1)[1:]
+        found = drive_arrays(update, [True] * 6, np.zeros((rows, 6)), values, temperatures=heat)
+        free = values["alpha_T"] * (heat - values["T_0"])
+        assert np.abs(found.eps - free[:, None] * np.array([1.0, 1, 1, 0, 0, 0])).max() < 1e-12 * (abs(free).max() + 1e-3)
+        assert np.abs(found.sig).max() < 1e-10 * values["E"] * (abs(free).max() + 1e-6)
