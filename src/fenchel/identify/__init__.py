@@ -1,4 +1,7 @@
-"""From triaxial tests on grains and wires to the law `texsol`: moduli, yield, hardening, intervals, predictions, report."""
+"""From triaxial tests to a law: moduli, yield, hardening, intervals, predictions, report.
+
+Tests on grains and wires give the law `texsol`, stage by stage; tests of a laboratory (`identify_laboratory`) any law that is asked for.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,12 @@ from .fit import LawFit, fit_law
 from .hardening import HardeningFit, Stage, fit_hardening, sensitivity
 from .identification import Control, Identification, identify_law
 from .interval import Estimate, estimate, jackknife_deviation
+from .laboratory import identify_laboratory
+from .laboratory_file import LaboratoryTest, read_laboratory
+from .laboratory_fit import LaboratoryFit, LaboratoryReplay, fit_laboratory
+from .laboratory_interval import LaboratoryEstimate
+from .laboratory_replay import LaboratoryRun
+from .laboratory_report import write_laboratory_report
 from .mismatch import Mismatch, phase_mismatch
 from .options import IdentifyOptions, Specimen
 from .parameters import LawParameters
@@ -32,6 +41,11 @@ __all__ = [
     "HardeningFit",
     "Identification",
     "IdentifyOptions",
+    "LaboratoryEstimate",
+    "LaboratoryFit",
+    "LaboratoryReplay",
+    "LaboratoryRun",
+    "LaboratoryTest",
     "LawFit",
     "LawParameters",
     "LineFit",
@@ -50,8 +64,10 @@ __all__ = [
     "elastic_moduli",
     "estimate",
     "fit_hardening",
+    "fit_laboratory",
     "fit_law",
     "fit_yield",
+    "identify_laboratory",
     "identify_law",
     "jackknife_deviation",
     "least_absolute_line",
@@ -60,8 +76,10 @@ __all__ = [
     "predict",
     "quality_notes",
     "quality_rows",
+    "read_laboratory",
     "replay",
     "sensitivity",
     "series_of",
+    "write_laboratory_report",
     "write_report",
 ]

@@ -17,15 +17,15 @@ from numpy.typing import NDArray
 
 from ..errors import ConvergenceError
 
-__all__ = ["bounded_least_squares"]
+__all__ = ["bounded_least_squares", "difference_columns"]
 
 Array = NDArray[np.float64]
 DIFFERENCE = 1e-5
 STEPS = 100
 
 
-def _columns(residual: Callable[[Array], Array], y: Array, centre: Array, upper: Array) -> Array:
-    """Forward (at the upper bound: backward) differences, shape (point_count, len(y))."""
+def difference_columns(residual: Callable[[Array], Array], y: Array, centre: Array, upper: Array) -> Array:
+    """Forward (at the upper bound: backward) differences of `residual` at y, where it is `centre`; shape (point_count, len(y))."""
     out = []
     for k in range(len(y)):
         h = DIFFERENCE if y[k] + DIFFERENCE <= upper[k] else -DIFFERENCE
@@ -36,12 +36,18 @@ def _columns(residual: Callable[[Array], Array], y: Array, centre: Array, upper:
 
 
 def bounded_least_squares(
-    residual: Callable[[Array], Array], start: Array, upper: Array, *, xtol: float = 1e-6, ftol: float = 1e-8
+    residual: Callable[[Array], Array],
+    start: Array,
+    upper: Array,
+    *,
+    xtol: float = 1e-6,
+    ftol: float = 1e-8,
+    what: str = "the hardening",
 ) -> Array:
     """Minimiser y of ½‖residual(y)‖² on 0 ≤ y ≤ `upper`, from `start`; unknowns scaled to order one.
 
     Stops when an accepted step is below `xtol`, gains less than `ftol` of the cost, no descent is left, or all unknowns are held.
-    Raises `ConvergenceError` after `STEPS` Jacobians.
+    Raises `ConvergenceError` after `STEPS` Jacobians; `what` is fitted, for its message.
     """
     y = np.clip(start, 0.0, upper)
     r = residual(y)
@@ -50,7 +56,7 @@ def bounded_least_squares(
     for _ in range(STEPS):
         if cost == 0.0:
             return y
-        jacobian = _columns(residual, y, r, upper)
+        jacobian = difference_columns(residual, y, r, upper)
         gradient = jacobian.T @ r
         free = ~(((y <= 0.0) & (gradient >= 0.0)) | ((y >= upper) & (gradient <= 0.0)))
         normal = jacobian[:, free].T @ jacobian[:, free]
@@ -75,4 +81,4 @@ def bounded_least_squares(
         damping = max(damping / 5.0, 1e-12)
         if gain <= ftol * cost:
             return y
-    raise ConvergenceError(f"the fit of the hardening did not settle in {STEPS} steps (misfit {np.sqrt(cost):.2e})")
+    raise ConvergenceError(f"the fit of {what} did not settle in {STEPS} steps (misfit {np.sqrt(cost):.2e})")

@@ -12,6 +12,7 @@ import numpy as np
 from .hardening import Stage
 from .identification import Identification
 from .interval import Estimate
+from .laboratory_interval import LaboratoryEstimate
 from .runs_info import RunsInfo
 
 __all__ = ["Table", "tables"]
@@ -88,7 +89,7 @@ def _scaled(unit: str, size: float) -> tuple[float, str]:
     return (1e-6, "MPa") if size >= 1e6 else (1e-3, "kPa") if size >= 1e3 else (1.0, "Pa")
 
 
-def estimate_row(name: str, e: Estimate) -> tuple[str, ...]:
+def estimate_row(name: str, e: Estimate | LaboratoryEstimate) -> tuple[str, ...]:
     """Name, value, interval, unit, source, remark."""
     sizes = [abs(v) for v in (e.value, e.low, e.high) if isfinite(v)]
     factor, unit = _scaled(e.unit, max(sizes, default=0.0) if not isfinite(e.value) or e.value == 0 else abs(e.value))
