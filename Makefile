@@ -37,6 +37,8 @@ lint: $(PROJECT) $(VENV)/.test $(VENV)/.lint
 	$(BIN)/lint-imports
 	rm -rf build/types && mkdir -p build/types && cp -RP build/__editable__.*/fenchel build/types/
 	$(BIN)/pyright
+	PATH="$(BIN):$$PATH" PYTHONPATH=build/types $(BIN)/pyright --verifytypes fenchel --ignoreexternal --outputjson \
+	  | $(BIN)/python .ci/public_types.py
 
 docs: $(PROJECT) $(VENV)/.docs
 	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html

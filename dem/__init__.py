@@ -8,6 +8,7 @@ requires), `detection`, `candidates`, `rows` (the solved one-step problem), `res
 from ..errors import InputError as _InputError  # noqa: F401  (an import above the folder: `import dem` from a checkout fails)
 from .adaptive import AdaptiveStep
 from .bodies import Assembly
+from .export.runs import Run, read_run
 from .materials import Laws, Material
 from .planes import Plane
 from .record import PhaseHistory, TriaxialRecord, mandel
@@ -28,6 +29,7 @@ __all__ = [
     "Plane",
     "Progress",
     "Relaxation",
+    "Run",
     "Scene",
     "Simulation",
     "Solver",
@@ -38,6 +40,7 @@ __all__ = [
     "lattice",
     "load_record",
     "mandel",
+    "read_run",
     "read_scene",
     "relax",
     "run_scene",

@@ -29,7 +29,8 @@ from .storage import load_run, save_run
 from .triaxial import TriaxialTest
 
 __all__ = [
-    "Progress", "Stage", "finished_test", "load_record", "record_content", "record_of", "run_scene", "run_stages", "triaxial_stage", "walk",
+    "Progress", "Stage", "finished_test", "load_record", "record_content", "record_of", "run_scene", "run_stages", "stored_record",
+    "triaxial_stage", "walk",
 ]  # fmt: skip
 
 
@@ -288,7 +289,11 @@ def record_of(content: dict[str, Any], settings: dict[str, Any]) -> TriaxialReco
 
 def load_record(path: Path | str) -> TriaxialRecord:
     """The record of a finished run; `InputError` when the file is unreadable or the run not finished."""
-    content, settings = load_run(path)
+    return stored_record(path, *load_run(path))
+
+
+def stored_record(path: Path | str, content: dict[str, Any], settings: dict[str, Any]) -> TriaxialRecord:
+    """The record in what was read from `path`; `InputError` when the run is not finished, or is no test."""
     if "record" not in content:
         raise InputError(f"{path}: the run is not finished; go on with `fenchel dem ... --resume`")
     try:

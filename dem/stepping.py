@@ -77,20 +77,20 @@ class Simulation:
         self.solver = solver
         self.theta = theta
         self._planes = tuple(planes)
-        self.skin = 0.15 * a.grain_radius if skin is None else skin
+        self.skin: float = 0.15 * a.grain_radius if skin is None else skin
         self._reach = 0.04 * assembly.grain_radius if reach is None else reach
         self._reach_grows = reach is None
         self.push_out = False  # rigid overlaps are pushed out (g/h signed): only sensible while velocities are reset
-        self.sweeps = 0  # of the last step
-        self.change = 0.0  # relative impulse change of the last sweep
-        self.total_sweeps = 0
-        self.total_rows = 0  # contact-iterations done
+        self.sweeps: int = 0  # of the last step
+        self.change: float = 0.0  # relative impulse change of the last sweep
+        self.total_sweeps: int = 0
+        self.total_rows: int = 0  # contact-iterations done
         self.contacts: Contacts | None = None
         if any(len(plane.normal) != a.dimension for plane in self.planes):
             raise InputError(f"planes: a normal of a {a.dimension}D scene has {a.dimension} components")
-        self.laws = material.laws(beads=bool(a.is_bead.any())) if isinstance(material, Material) else material
+        self.laws: Laws = material.laws(beads=bool(a.is_bead.any())) if isinstance(material, Material) else material
         self._linked = self.laws.wire is not None and len(a.links) > 0
-        self.kernels = SceneKernels(
+        self.kernels: SceneKernels = SceneKernels(
             dimension=a.dimension,
             spin=_spin(a),
             contact=self.laws.contact,

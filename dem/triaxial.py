@@ -92,23 +92,23 @@ class TriaxialTest:
     ) -> None:
         if not pressure > 0.0:
             raise InputError(f"pressure = {pressure} Pa: grains without cohesion need a positive confining pressure")
-        self.simulation = Simulation(assembly, material, solver, reach=0.04 * assembly.grain_radius)
-        self.name = f"triaxial at {pressure / 1e3:g} kPa"
+        self.simulation: Simulation = Simulation(assembly, material, solver, reach=0.04 * assembly.grain_radius)
+        self.name: str = f"triaxial at {pressure / 1e3:g} kPa"
         self.pressure = pressure
-        self.path = tuple(float(e) for e in strain_path)
-        self.time_scale = inertial_time(assembly, pressure, density)
-        self.step = step_fraction * self.time_scale
-        self.rate = inertial_number / self.time_scale
+        self.path: tuple[float, ...] = tuple(float(e) for e in strain_path)
+        self.time_scale: float = inertial_time(assembly, pressure, density)
+        self.step: float = step_fraction * self.time_scale
+        self.rate: float = inertial_number / self.time_scale
         self.frame_strain = frame_strain
-        self.start_half = assembly.half.copy()
-        self.start_x = assembly.x.copy()
-        self.sphere = sphere * float(assembly.half.min())
+        self.start_half: Array = assembly.half.copy()
+        self.start_x: Array = assembly.x.copy()
+        self.sphere: float = sphere * float(assembly.half.min())
         self.prestressed = prestressed
-        self.leg = 0
-        self.speed = 0.0  # present strain rate over the nominal one, signed
-        self.steps = 0
-        self.sums = dict.fromkeys(_SUMMED, 0.0)
-        self.peaks = dict.fromkeys(_PEAKS, 0.0)
+        self.leg: int = 0
+        self.speed: float = 0.0  # present strain rate over the nominal one, signed
+        self.steps: int = 0
+        self.sums: dict[str, float] = dict.fromkeys(_SUMMED, 0.0)
+        self.peaks: dict[str, float] = dict.fromkeys(_PEAKS, 0.0)
         self.frames: dict[str, list[Any]] = {name: [] for name in (*_FRAMES, *_SERIES)}
 
     @property

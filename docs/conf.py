@@ -23,6 +23,7 @@ extensions = [
     "command_line",
     "file_keys",
     "law_library",
+    "local_links",
     "prose",
 ]
 exclude_patterns = ["_build", "_generate", "**.ipynb_checkpoints"]

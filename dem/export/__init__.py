@@ -1,4 +1,7 @@
-"""Exports of a sample: VTK for ParaView, extended XYZ for OVITO, pictures; from a run file or from a live simulation."""
+"""Exports of a sample: VTK for ParaView, extended XYZ for OVITO, pictures; from a run file or from a live simulation.
+
+A run file as a whole, with its figure and its view, is `fenchel.dem.read_run`.
+"""
 
 from .extended_xyz import write_extended_xyz
 from .picture import draw_networks, write_picture

@@ -19,7 +19,7 @@ from ..storage import replace_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["draw_networks", "write_picture"]
+__all__ = ["colours_on_white", "draw_networks", "unit_scale", "write_image", "write_picture"]
 
 Array = NDArray[np.float64]
 
@@ -27,7 +27,7 @@ _AXES = "xyz"
 _FULL = 4.0  # forces above this many means are drawn alike
 
 
-def _scale(size: float, unit: str) -> tuple[float, str]:
+def unit_scale(size: float, unit: str) -> tuple[float, str]:
     """Factor and name of the multiple of a unit in which a positive size reads best."""
     for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
         if size * factor >= 1.0:
@@ -58,7 +58,7 @@ def draw_networks(network: Network, *, view: str = "xz", thickness: float | None
     high = (network.x[seen] + network.radius[seen, None]).max(axis=0)[axes]
     margin = 0.02 * float((high - low).max()) + (2.0 * network.grain_radius if network.fixed.any() else 0.0)
     low, high = low - margin, high + margin
-    factor, unit = _scale(float((high - low).max()), "m")
+    factor, unit = unit_scale(float((high - low).max()), "m")
     count = 2 if linked else 1
     shape = float((high - low)[1] / (high - low)[0])
     wide = shape < 0.7
@@ -87,7 +87,7 @@ def draw_networks(network: Network, *, view: str = "xz", thickness: float | None
     return figure
 
 
-def _colours() -> Any:
+def colours_on_white() -> Any:
     """Cividis from ochre to dark blue: its bright yellow is lost on white."""
     from matplotlib import colormaps
     from matplotlib.colors import LinearSegmentedColormap
@@ -140,9 +140,13 @@ def _contacts(
     mean = float(network.normal_force.mean()) if len(network.pair) else float(force.mean())
     order = np.argsort(force)
     strength = np.minimum(force[order] / mean, _FULL) / _FULL
-    scale, unit = _scale(mean, "N")
+    scale, unit = unit_scale(mean, "N")
     drawn = LineCollection(
-        list(factor * lines[order]), linewidths=0.3 + thick * strength, cmap=_colours(), capstyle="round", zorder=3
+        list(factor * lines[order]),
+        linewidths=0.3 + thick * strength,
+        cmap=colours_on_white(),
+        capstyle="round",
+        zorder=3,
     )
     drawn.set_array(np.asarray(scale * force[order]))
     drawn.set_clim(0.0, scale * _FULL * mean)
@@ -164,11 +168,11 @@ def _wires(figure: Any, panel: Any, network: Network, axes: list[int], factor: f
     tension = network.tension[taut]
     order = np.argsort(tension)
     top = float(np.quantile(tension, 0.99))
-    scale, unit = _scale(top, "N")
+    scale, unit = unit_scale(top, "N")
     drawn = LineCollection(
         list(lines[taut][order]),
         linewidths=0.3 * thick + 0.7 * thick * np.minimum(tension[order] / top, 1.0),
-        cmap=_colours(),
+        cmap=colours_on_white(),
         capstyle="round",
     )
     drawn.set_array(np.asarray(scale * tension[order]))
@@ -180,10 +184,18 @@ def _wires(figure: Any, panel: Any, network: Network, axes: list[int], factor: f
 
 def write_picture(network: Network, path: Path | str, *, view: str = "xz", thickness: float | None = None) -> Path:
     """Save `draw_networks` to a file; its ending says the format (png, svg, pdf). `InputError` for one that matplotlib does not know."""
+    return write_image(draw_networks(network, view=view, thickness=thickness), path)
+
+
+def write_image(figure: Figure, path: Path | str) -> Path:
+    """Save a figure to a file, which is replaced as a whole; equal figures give equal files.
+
+    The ending says the format (png, svg, pdf): `InputError` for one that matplotlib does not know, `StorageError` where it cannot be
+    written.
+    """
     import io
 
     path = Path(path)
-    figure = draw_networks(network, view=view, thickness=thickness)
     image = io.BytesIO()
     kind = path.suffix.lstrip(".").lower()
     known = figure.canvas.get_supported_filetypes()

@@ -151,7 +151,7 @@ class VtkSeries:
     """A run in pictures: `add` writes the files of one instant and the collections `STEM.bodies.pvd` and so on, which ParaView plays."""
 
     def __init__(self, stem: Path | str) -> None:
-        self.stem = Path(stem)
+        self.stem: Path = Path(stem)
         self.times: list[float] = []
 
     def add(self, network: Network) -> list[Path]:

@@ -7,11 +7,11 @@
 from __future__ import annotations
 
 import importlib
-import inspect
 from typing import Any
 
 from docutils import nodes
 from docutils.statemachine import StringList
+from public_surface import listed
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
 from sphinx.util.nodes import nested_parse_with_titles
@@ -24,17 +24,15 @@ class PublicNames(SphinxDirective):
 
     def run(self) -> list[nodes.Node]:
         module = importlib.import_module(self.arguments[0])
-        names = list(getattr(module, "__all__", ()))
         lines = [f".. automodule:: {module.__name__}", "   :no-members:", ""]
-        for name in names:
-            item = getattr(module, name)
-            home = getattr(item, "__module__", None) or module.__name__
-            if not f"{home}.".startswith(f"{module.__name__}."):
-                continue  # it has its path in another room
-            if inspect.isclass(item):
-                lines += [f".. autoclass:: {module.__name__}.{name}", "   :members:", "   :show-inheritance:", ""]
-            elif inspect.isroutine(item):
-                lines += [f".. autofunction:: {module.__name__}.{name}", ""]
+        for name, kind in listed(module.__name__):
+            path = f"{module.__name__}.{name}"
+            if kind == "class":
+                lines += [f".. autoclass:: {path}", "   :members:", "   :show-inheritance:", ""]
+            elif kind == "function":
+                lines += [f".. autofunction:: {path}", ""]
+            else:
+                lines += [f".. py:data:: {path}", f"   :type: {type(getattr(module, name)).__name__}", ""]
         node = nodes.Element()
         node.document = self.state.document
         nested_parse_with_titles(self.state, StringList(lines, source=module.__name__), node)

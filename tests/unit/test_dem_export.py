@@ -1,4 +1,6 @@
-"""Exports, read back by code that shares nothing with the writer, and by the libraries of ParaView and OVITO where they are installed."""
+"""Exports, read back by code that shares nothing with the writer: parsers of the published formats, the library extxyz, and those of
+ParaView and OVITO where they are installed.
+"""
 
 from __future__ import annotations
 
@@ -244,6 +246,35 @@ def test_extended_xyz_holds_the_bodies_to_the_last_bit(network: Network, tmp_pat
     assert blocks[0][1]["species"].tolist() == ["grain"] * 60 + ["bead"] * 24 and blocks[1][1]["species"][0] == "fixed"
 
 
+@pytest.mark.parametrize("parser", ["C", "Python"])
+def test_the_library_of_the_format_reads_it(network: Network, flat: Network, tmp_path: Path, parser: str) -> None:
+    """extxyz, by the authors of the specification: its two parsers, one generated from the grammar, share nothing with the writer."""
+    import extxyz
+
+    states = [network, replace(network, time=2.0, fixed=np.arange(len(network.x)) == 3)]
+    file = write_extended_xyz(states, tmp_path / "run.xyz")
+    frames = extxyz.read_dicts(file, use_cextxyz=parser == "C")
+    assert len(frames) == 2
+    for frame, state in zip(frames, states, strict=True):
+        assert frame.natoms == len(state.x) and frame.info["Time"] == state.time and not np.any(frame.pbc)
+        np.testing.assert_array_equal(frame.cell, np.diag(2.0 * state.half))
+        np.testing.assert_array_equal(frame.info["Origin"], -state.half)
+        for name, values in {
+            "pos": state.x, "radius": state.radius, "velo": state.velocity, "wire": state.wire, "rank": state.rank,
+        }.items():  # fmt: skip
+            np.testing.assert_array_equal(frame.arrays[name], values, err_msg=name)
+        assert frame.arrays["contacts"].sum() == 2 * len(state.pair) + len(state.wall)
+        assert frame.arrays["species"].tolist() == [
+            "fixed" if held else "bead" if bead else "grain"
+            for held, bead in zip(state.fixed, state.is_bead, strict=True)
+        ]
+    plane = extxyz.read_dicts(write_extended_xyz(flat, tmp_path / "flat.xyz"), use_cextxyz=parser == "C")
+    np.testing.assert_array_equal(plane.arrays["pos"], np.column_stack([flat.x, np.zeros(3)]))
+    # a state by itself has no box, and no lattice
+    loose = write_extended_xyz(replace(network, half=np.full(3, np.inf)), tmp_path / "loose.xyz")
+    assert not np.any(extxyz.read_dicts(loose, use_cextxyz=parser == "C").cell)
+
+
 def test_ovito_reads_it(network: Network, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("QT_QPA_PLATFORM", "offscreen")
     io = pytest.importorskip(
@@ -355,6 +386,14 @@ def test_the_command_exports_now_or_later(tmp_path: Path, capsys: pytest.Capture
     np.testing.assert_array_equal(columns["pos"], network.x)
     np.testing.assert_allclose(network.x, content["assembly"]["x"], atol=1e-6)
     assert set(np.unique(network.friction)) == {0.2, 0.35}
+    import extxyz
+
+    frame, stored = extxyz.read_dicts(tmp_path / "run.xyz"), content["assembly"]
+    # places are those at which the contacts were detected, a step before the end
+    np.testing.assert_allclose(frame.arrays["pos"], stored["x"] - stored["step"] * stored["velocity"], rtol=1e-14)
+    for name in ("radius", "wire", "rank"):
+        np.testing.assert_array_equal(frame.arrays[name], stored[name], err_msg=name)
+    assert frame.info["Time"] == stored["time"]
     _, found = read_poly_data(tmp_path / "run.contacts.vtp")
     assert 0.9 < found["CellData"]["mobilised"].max() <= 1.0 + 1e-9
     assert main(["dem", str(scene), "-o", str(run), "--resume", "--quiet", "--export", "stl"]) == 2
@@ -377,7 +416,7 @@ def test_a_run_that_goes_on_is_exported_and_results_without_sample_are_refused(t
     save_run(tmp_path / "results.h5", {"a": np.zeros(3)}, {})
     with pytest.raises(InputError, match="no sample"):
         export_run(tmp_path / "results.h5", "vtk")
-    with pytest.raises(InputError, match="vtk, xyz, picture"):
+    with pytest.raises(InputError, match="vtk, xyz, picture, plot"):
         export_run(tmp_path / "half.h5", "stl")  # pyright: ignore[reportArgumentType]
 
 

@@ -8,6 +8,8 @@ from typing import Any
 
 import typer
 
+from .signs import Signs
+
 __all__ = ["register"]
 
 
@@ -15,6 +17,7 @@ class _Export(StrEnum):
     vtk = "vtk"
     xyz = "xyz"
     picture = "picture"
+    plot = "plot"
 
 
 def register(app: typer.Typer) -> None:
@@ -29,7 +32,11 @@ def _dem(
     export: list[_Export] = typer.Option(
         [],
         "--export",
-        help="Also write the last state beside RUN.h5: vtk (ParaView), xyz (OVITO), picture; may be repeated.",
+        help="Also write beside RUN.h5 the last state: vtk (ParaView), xyz (OVITO), picture (forces); plot: the sample and what was "
+        "measured. May be repeated.",
+    ),
+    signs: Signs = typer.Option(
+        Signs.tension, "--signs", help="Signs of the strains in the plot; files stay tension positive."
     ),
     quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the quality of the run as JSON."),
@@ -55,14 +62,14 @@ def _dem(
     from .tables import print_json, print_table
 
     if is_motion(scene):
-        _motion(scene, output, resume, quiet, json_wanted, export)
+        _motion(scene, output, resume, quiet, json_wanted, export, signs)
         return
     if is_slope(scene):
-        _slope(scene, output, resume, quiet, json_wanted, export)
+        _slope(scene, output, resume, quiet, json_wanted, export, signs)
         return
     with progress_bar(not quiet) as progress:
         record = run_scene(scene, output, resume=resume, progress=progress)
-    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value, signs=signs.value)]
     measures = summary(network_of_run(output))
     if json_wanted:
         print_json(
@@ -87,7 +94,9 @@ def _dem(
         _print_accuracy(output, record.quality["natural_map_max"])
 
 
-def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
+def _motion(
+    scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export], signs: Signs
+) -> None:
     """Run a scene of free bodies."""
     from fenchel.dem.export import export_run, network_of_run
     from fenchel.dem.measures import summary
@@ -98,7 +107,7 @@ def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: b
 
     with progress_bar(not quiet) as progress:
         content = run_motion(scene, output, resume=resume, progress=progress)
-    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value, signs=signs.value)]
     measures = summary(network_of_run(output))
     frames, quality = content["frames"], content["quality"]
     if json_wanted:
@@ -121,7 +130,9 @@ def _motion(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: b
     _print_accuracy(output, quality["natural_map_max"])
 
 
-def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export]) -> None:
+def _slope(
+    scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bool, export: list[_Export], signs: Signs
+) -> None:
     """Run the scene of a deposit."""
     from fenchel.dem.export import export_run, network_of_run
     from fenchel.dem.measures import summary
@@ -132,7 +143,7 @@ def _slope(scene: Path, output: Path, resume: bool, quiet: bool, json_wanted: bo
 
     with progress_bar(not quiet) as progress:
         content = run_slope(scene, output, resume=resume, progress=progress)
-    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value)]
+    exported = [file for kind in dict.fromkeys(export) for file in export_run(output, kind.value, signs=signs.value)]
     measures = summary(network_of_run(output))
     quality, profile = content["quality"], content["profile"]
     if json_wanted:
