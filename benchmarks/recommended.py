@@ -67,7 +67,9 @@ def laws(first, last, points=100):
             bound = update.verify(out, load.state, load.dt, points=points, **load.values)
             met[accuracy] += bool(bound.confirms(accuracy))
             if not bound.confirms(accuracy):
-                print(seed, f"accuracy {accuracy:g} not met by {update.solver}: {bound.difference.max():.1e}", flush=True)
+                print(
+                    seed, f"accuracy {accuracy:g} not met by {update.solver}: {bound.difference.max():.1e}", flush=True
+                )
             if point.error is not None and point.error <= accuracy:
                 ratios[accuracy].append(point.cost / min(p.cost for p in good))
     for accuracy in wanted:

@@ -33,6 +33,7 @@ from .history import History, Plan, path_plan, time_steps
 from .path_certificate import PathData, gaps_or_none, path_tangents, worst_condition
 from .path_file import StrainStressPath, read_path
 from .step_order import StepOrder, measure_order
+from .summary import as_html, as_text
 from .thermal import thermal_input
 from .update import build_update
 
@@ -84,6 +85,31 @@ class Comparison:
     def agree(self) -> bool:
         """True if a run followed the path and all that did agree."""
         return self.reference is not None and all(run.agrees is not False for run in self.runs)
+
+    def _summary(self) -> tuple[str, list[tuple[str, ...]]]:
+        agree = "no run follows the path" if self.reference is None else ("agree" if self.agree else "DISAGREE")
+        title = f"{self.law}, {self.rows} rows, {len(self.runs)} runs: {agree}; {self.verdict.headline}"
+        return title, [_RUN_HEADS, *(_run_cells(run, k == self.reference) for k, run in enumerate(self.runs))]
+
+    def __repr__(self) -> str:
+        return as_text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        title, rows = self._summary()
+        return as_html(title, rows[1:], _RUN_HEADS)
+
+
+_RUN_HEADS = ("run", "rows", "stress", "gap", "µs per step", "agrees")
+
+
+def _run_cells(run: Run, reference: bool) -> tuple[str, ...]:
+    """A run in a row: differences relative to the reference (*), or why it failed."""
+    name = f"{'* ' if reference else ''}{run.formulation} {run.solver}"
+    if run.failure:
+        return name, "", "", "", "", run.failure if len(run.failure) < 60 else run.failure[:57] + "..."
+    figures = ("" if x is None else f"{x:.1e}" for x in (run.stress, run.gap))
+    time = "" if run.time_per_step is None else f"{run.time_per_step * 1e6:.3g}"
+    return name, str(run.rows), *figures, time, {True: "yes", False: "NO", None: ""}[run.agrees]
 
 
 def compare(

@@ -258,7 +258,9 @@ def reference(
                 slopes[i, :6] = -given.strain_constraint.dual_value * given.size / given.strain_unit
             increment[i] = program.increments(data[row : row + 1], y[None])[0]
             left[0][row], left[1][row] = y, multipliers
-        parts.append(Part(points, program, data, _as_left(program, *left, slopes[points], residual[points], status[points])))
+        parts.append(
+            Part(points, program, data, _as_left(program, *left, slopes[points], residual[points], status[points]))
+        )
     return StepSolution(slopes, None, increment, residual, status, np.zeros(n, dtype=np.int64), parts)
 
 

@@ -27,6 +27,7 @@ from .path_loop import path_loop
 from .prescribed_path import follow_prescribed, has_tangent
 from .stress_path import stress_plan
 from .stress_update import StressUpdate
+from .summary import array_rows, as_html, as_text, status_words
 from .thermal import thermal_input, thermal_results
 from .update import Update
 
@@ -55,6 +56,17 @@ class History:
     temperature: Array | None = None
     entropy: Array | None = None
     iterations: Array | None = None
+
+    def _summary(self) -> tuple[str, list[tuple[str, ...]]]:
+        names = ("eps", "sig", "psi", "dissipation", "temperature", "entropy", "iterations")
+        rows = array_rows({name: getattr(self, name) for name in names}, self.state)
+        return f"path of {len(self.eps)} rows: {status_words(self.status)}", rows
+
+    def __repr__(self) -> str:
+        return as_text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._summary())
 
 
 def drive_arrays(

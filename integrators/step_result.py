@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from .summary import array_rows, as_html, as_text, status_words
+
 __all__ = ["StepResult"]
 
 Array = NDArray[np.float64]
@@ -32,3 +34,15 @@ class StepResult:
     entropy: Array | None = None
     flux: Array | None = None
     strain: Array | None = None
+
+    def _summary(self) -> tuple[str, list[tuple[str, ...]]]:
+        names = ("stress", "strain", "tangent", "dissipation", "gap", "entropy", "flux")
+        rows = array_rows({name: getattr(self, name) for name in names}, self.state)
+        count = len(self.status)
+        return f"step of {count} point{'' if count == 1 else 's'}: {status_words(self.status)}", rows
+
+    def __repr__(self) -> str:
+        return as_text(*self._summary())
+
+    def _repr_html_(self) -> str:
+        return as_html(*self._summary())

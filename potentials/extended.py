@@ -93,6 +93,9 @@ class Extended:
             parts.append(rf"I\left\{{{inside}\right\}}")
         return " + ".join(parts) or "0"
 
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
 
 def as_extended(value: Any, what: str) -> Extended:
     """An `Extended` from one or from a scalar expression."""

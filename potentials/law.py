@@ -17,9 +17,10 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
-from sympy import Expr, S, default_sort_key, sstr
+from sympy import Expr, S, default_sort_key, latex, sstr
 
 from ..errors import DeclarationError, InputError
+from ..notebook import math as math_rows
 from .declaration import check_declaration, normalise
 from .derivative import partial
 from .extended import Extended, scalar_expression
@@ -287,8 +288,53 @@ class Law:
         """The same step as a cvxpy problem; see `fenchel.integrators.conic`."""
         return _integrators().conic_step(self, eps_new, state, values)
 
+    def plot(
+        self,
+        *,
+        history: Any = None,
+        state: Mapping[str, Any] | None = None,
+        pressure: float | None = None,
+        angle: float | None = None,
+        direction: Any = (0.0, 0.0, 1.0, 0.0, 0.0, 0.0),
+        strain: float | None = None,
+        size: float | None = None,
+        limit: float | None = None,
+        measure: str = "sqrt_J2",
+        signs: str = "tension-positive",
+        **values: Any,
+    ) -> Any:
+        """A `matplotlib.figure.Figure`: the surfaces f = 0 in the meridian plane (mean stress, ±√J₂) and in the deviatoric plane, and ρψ
+        beside ρψ*, whose sum is σ:ε (Fenchel–Young).
+
+        `values`: parameters by name, and the temperature [K]. `history`: what `drive` returns; its path is drawn, the surfaces are those
+        after its last row. `state`: internal variables by name instead, tensors (6,) Mandel; virgin without. The deviatoric plane lies at
+        the mean `pressure` −tr σ/3 [Pa], the meridian plane at `angle` [rad] (π/3: triaxial compression along axis 3), see
+        `fenchel.potentials.surface`. ψ is drawn along `direction` (6,) Mandel up to `strain` [-]. A finite φ* is drawn by level sets, for
+        stresses of `size` [Pa]; what is unbounded ends at `limit` [Pa]. `measure` of the ordinate: "sqrt_J2" or "q" = √(3 J₂); `signs`:
+        "tension-positive" or "compression-positive". What has no picture is said under the figure. Raises `InputError` for wrong input.
+        """
+        from .law_figure import law_figure
+
+        return law_figure(
+            self,
+            values,
+            history=history,
+            state=state,
+            pressure=pressure,
+            angle=angle,
+            direction=direction,
+            strain=strain,
+            size=size,
+            limit=limit,
+            measure=measure,
+            signs=signs,
+        )
+
     def __str__(self) -> str:
         return self.text
+
+    def _repr_latex_(self) -> str:
+        return math_rows(_declared(self))
 
     # -- checks ------------------------------------------------------------------------------------------------------------
 
@@ -307,6 +353,22 @@ class Law:
                     f"law '{self.name}': the internal variable '{variable}' cannot evolve, because phi_star does not mention its force; "
                     f"add forces({variable}) to phi_star or take the variable out"
                 )
+
+
+def _declared(law: Law) -> list[tuple[str, str]]:
+    """Rows of the declaration: a word and LaTeX."""
+    rows = [("law", r"\mathtt{" + law.name.replace("_", r"\_") + "}")]
+    rows += [("density", rf"\rho = {latex(law.density)}")] if law.density is not None else []
+    psi, star = (r"\psi", law.psi) if law.psi is not None else (r"\psi^{*}", law.psi_star)
+    rows.append(("free energy" if law.psi is not None else "conjugate energy", f"{psi} = {latex(star)}"))
+    potential, name = (law.phi, r"\varphi") if law.phi is not None else (law.phi_star, r"\varphi^{*}")
+    if potential is not None:
+        word = "dissipation potential" if law.phi is not None else "force function"
+        rows.append((word, f"{name} = {potential.latex()}"))
+    rows.append(("observable", latex(law.observable)))
+    if law.internal:
+        rows.append(("internal", ",\\ ".join(latex(v) for v in law.internal)))
+    return rows
 
 
 def _full(expression: Any) -> str:

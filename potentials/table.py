@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import DeclarationError, InputError
+from ..notebook import math
 from .derivative import invariants_of
 from .invariants import InnerLeaf
 from .law import Law
@@ -49,6 +50,12 @@ class Table:
         """LaTeX, one aligned row per law."""
         rows = [rf"\text{{{r.title}}} & {r.tex} \\" for r in self.rows]
         return "\n".join([r"\begin{array}{ll}", *rows, r"\end{array}"])
+
+    def __str__(self) -> str:
+        return self.text()
+
+    def _repr_latex_(self) -> str:
+        return math([(r.title, r.tex) for r in self.rows])
 
     def json(self) -> str:
         """JSON with the same rows."""

@@ -95,6 +95,10 @@ class AdmissibilityReport:
     def __str__(self) -> str:
         return self.text()
 
+    def __repr__(self) -> str:
+        under = f" under {len(self.conditions)} conditions" if self.conditions else ""
+        return f"<AdmissibilityReport of law '{self.law}': {self.verdict}{under}; print(report) says why>"
+
     def _repr_markdown_(self) -> str:
         return f"```\n{self.text()}\n```"
 

@@ -219,6 +219,9 @@ class Conjugate:
 
     __str__ = text
 
+    def _repr_latex_(self) -> str:
+        return f"$\\displaystyle {self.latex()}$"
+
 
 def supremum_words(function: Extended, duals: Mapping[Any, Any]) -> Words:
     """sup over x of y·x − F(x)."""

@@ -20,6 +20,7 @@ from typing import Any
 
 from .cache import cache_folder, content_hash, replace_file
 from .errors import InputError
+from .notebook import html_table, text_table
 
 __all__ = ["Front", "Measured", "checked_accuracy", "environment", "fingerprint", "kept_front", "shipped_front"]
 
@@ -86,6 +87,30 @@ class Front:
     def recommended(self, accuracies: Iterable[float]) -> dict[float, Measured | None]:
         """The cheapest setting for each accuracy."""
         return {accuracy: self.cheapest(accuracy) for accuracy in accuracies}
+
+    def _summary(self) -> tuple[str, tuple[str, ...], list[tuple[str, ...]]]:
+        inside = set(self.efficient)
+        order = sorted(range(len(self.points)), key=lambda k: self.points[k].cost)
+        rows = [
+            (
+                "*" if k in inside else "",
+                self.points[k].name,
+                f"{self.points[k].cost:.3g}",
+                f"{self.points[k].error:.1e}"
+                if self.points[k].error is not None
+                else self.points[k].failure or "failed",
+            )
+            for k in order
+        ]
+        title = f"{self.kind} of {self.subject}: {len(inside)} of {len(self.points)} settings are not dominated (*)"
+        return title, ("", "setting", f"cost [{self.cost}]", f"error ({self.measure})"), rows
+
+    def __repr__(self) -> str:
+        title, heads, rows = self._summary()
+        return text_table(title, [heads, *rows])
+
+    def _repr_html_(self) -> str:
+        return html_table(*self._summary())
 
     def as_dict(self) -> dict[str, Any]:
         """As plain numbers, words, lists and dictionaries."""

@@ -182,5 +182,7 @@ def test_free_thermal_expansion_leaves_no_stress(solver, rows):
         heat = np.linspace(values["T_0"], end, rows + 1)[1:]
         found = drive_arrays(update, [True] * 6, np.zeros((rows, 6)), values, temperatures=heat)
         free = values["alpha_T"] * (heat - values["T_0"])
-        assert np.abs(found.eps - free[:, None] * np.array([1.0, 1, 1, 0, 0, 0])).max() < 1e-12 * (abs(free).max() + 1e-3)
+        assert np.abs(found.eps - free[:, None] * np.array([1.0, 1, 1, 0, 0, 0])).max() < 1e-12 * (
+            abs(free).max() + 1e-3
+        )
         assert np.abs(found.sig).max() < 1e-10 * values["E"] * (abs(free).max() + 1e-6)

@@ -4,10 +4,15 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
+from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
+
+if TYPE_CHECKING:
+    from fenchel.potentials import Law
 
 __all__ = ["LAW", "Formulation", "Split", "register"]
 
@@ -78,10 +83,18 @@ def _show(
     split: Split = typer.Option(Split.total, "--split", help="Strain that the table is written in."),
     latex: bool = typer.Option(False, "--latex", help="Print LaTeX."),
     json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
+    plot: Path | None = typer.Option(
+        None, "--plot", metavar="FILE.png|svg", help="Draw the surfaces and energies at the values of -p."
+    ),
+    pairs: list[str] = VALUES,
+    parameters: Path | None = PARAMETERS,
+    signs: Signs = SIGNS,
 ) -> None:
-    """Table 1 of a law: its potentials, state laws and complementary laws.
+    """Table 1 of a law: its potentials, state laws and complementary laws; with --plot also its figure.
 
     Example: fenchel show sand --formulation strain
+
+    Example: fenchel show tresca --plot tresca.png -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_i=0
     """
     from fenchel.errors import InputError
     from fenchel.potentials import load_law
@@ -90,7 +103,12 @@ def _show(
 
     if latex and json_wanted:
         raise InputError("show prints either --latex or --json: leave one out")
-    table = load_law(law).table(formulation.value, split=split.value)
+    if plot is None and (pairs or parameters is not None):
+        raise InputError("the table of a law has no values: give --plot FILE.png too, or leave -p and --parameters out")
+    declared = load_law(law)
+    table = declared.table(formulation.value, split=split.value)
+    if plot is not None:
+        _draw(declared, plot, parameter_values(pairs, parameters), signs)
     if json_wanted:
         content = table.json()
         if isinstance(content, str):
@@ -99,6 +117,19 @@ def _show(
             print_json(content)
     else:
         typer.echo(table.latex() if latex else table.text())
+
+
+def _draw(law: Law, file: Path, values: dict[str, float], signs: Signs) -> None:
+    """Write the figure of a law, in one piece."""
+    from fenchel.cache import replace_file
+    from fenchel.errors import InputError
+    from fenchel.potentials.law_figure import law_figure, picture
+
+    kind = file.suffix.lower().removeprefix(".")
+    if kind not in ("png", "svg"):
+        raise InputError(f"--plot {file}: the figure is written as .png or .svg: write --plot {file.stem or 'law'}.png")
+    figure = law_figure(law, values, signs=signs.value)
+    replace_file(file.resolve(), picture(figure, kind))
 
 
 def _check(
