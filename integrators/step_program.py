@@ -25,7 +25,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .canonical import CanonicalForm, Cone, dual_cones
-from .cone_projection import SEMIDEFINITE
+from .cone_projection import EXPONENTIAL, POWER, SEMIDEFINITE
 from .natural_units import cleaned, natural_units
 
 __all__ = ["FlowForm", "Stacked", "StepProgram", "assemble", "flow_of_dual", "flow_of_rates", "stacked"]
@@ -249,24 +249,28 @@ def stacked(
     return Stacked(full, E, G, H, cones, B[6 : 6 + m])
 
 
-def _column_scale(P: Array, E: Array, G: Array) -> Array:
+def _column_scale(P: Array, E: Array, G: Array, cones: Sequence[Cone]) -> Array:
     """Positive column scales that bring [P; E; G] near unit size, rows of E and G being free to scale.
 
     First the logarithms of all entries by least squares (Curtis and Reid, 1972), with those of the curvatures, which have no row to
     scale: a unit that several unknowns share shows only in rows that tie them to others (a multiplier by a strength of 1e9 Pa, a rate over
-    a short step). Then largest entries in turn (Ruiz, 2001).
+    a short step). Then largest entries in turn (Ruiz, 2001), which is all where ψ has powers or exponentials: their cones tie units
+    that rows do not show.
     """
     rows = np.vstack([E, G])
-    scale = _geometric_scale(np.diag(P), rows)
-    left = np.ones(rows.shape[0])
+    scale, left = np.ones(rows.shape[1]), np.ones(rows.shape[0])
+    if not any(cone.kind in (EXPONENTIAL, POWER) for cone in cones):
+        scale = _geometric_scale(np.diag(P), rows)
+        across = np.abs(rows * scale[None, :]).max(axis=1, initial=0.0)
+        left /= np.where(across > 0.0, across, 1.0)
     for _ in range(12):
         inside = np.abs(P * scale[:, None] * scale[None, :])
         outside = np.abs(rows * left[:, None] * scale[None, :])
-        across = outside.max(axis=1, initial=0.0)
-        left /= np.where(across > 0.0, across, 1.0)
-        outside = np.abs(rows * left[:, None] * scale[None, :])
         size = np.maximum(np.sqrt(inside.max(axis=0, initial=0.0)), outside.max(axis=0, initial=0.0))
         scale /= np.sqrt(np.where(size > 0.0, size, 1.0))
+        outside = np.abs(rows * left[:, None] * scale[None, :])
+        across = outside.max(axis=1, initial=0.0)
+        left /= np.sqrt(np.where(across > 0.0, across, 1.0))
     return scale
 
 
@@ -305,7 +309,7 @@ def _reduce(
     """Eliminate equalities, whiten, scale; arguments are maps of (1, d, x) (H of (1, d))."""
     k = 1 + width
     n = full.shape[0] - k
-    scale = _column_scale(full[k:, k:], E[:, k:], G)
+    scale = _column_scale(full[k:, k:], E[:, k:], G, cones)
     D = np.ones(k + n)
     D[k:] = scale
     full, E, X = full * D[:, None] * D[None, :], E * D, X * D
