@@ -68,14 +68,26 @@ class Front:
         than five per cent count as equal, as do errors below 1e-12, and of two equal settings the first one stays.
         """
         good = [k for k, p in enumerate(self.points) if p.error is not None]
-        found = [k for k in good if not any(_dominates(self.points, j, k) for j in good if j != k)]
+        best: dict[float, list[int]] = {}
+        for k in good:
+            if not any(_dominates(self.points[j], self.points[k]) for j in good):
+                best.setdefault(_error(self.points[k]), []).append(k)
+        found = []
+        for alike in (
+            best.values()
+        ):  # of one error: equal costs are no order by themselves (1, 1.04 and 1.08), those of the cheapest are
+            least = min(self.points[k].cost for k in alike)
+            found.append(next(k for k in alike if self.points[k].cost <= least * (1.0 + SLACK)))
         return tuple(sorted(found, key=lambda k: self.points[k].cost))
 
     def cheapest(self, accuracy: float) -> Measured | None:
-        """The cheapest setting whose error is at most `accuracy`; of those that cost the same (five per cent) the most accurate."""
+        """The cheapest setting whose error is at most `accuracy`, none that another dominates; of those that cost the same (five per cent)
+        the most accurate."""
         good = [p for p in self.points if p.error is not None and _error(p) <= accuracy]
         if not good:
             return None
+        inside = [self.points[k] for k in self.efficient]
+        good = [p for p in good if p in inside]
         least = min(p.cost for p in good)
         return min((p for p in good if p.cost <= least * (1.0 + SLACK)), key=_error)
 
@@ -134,11 +146,9 @@ def _error(point: Measured) -> float:
     return math.inf if point.error is None else max(point.error, ROUNDING)
 
 
-def _dominates(points: Sequence[Measured], j: int, k: int) -> bool:
-    one, other = points[j], points[k]
-    if _error(one) > _error(other) or one.cost > other.cost * (1.0 + SLACK):
-        return False
-    return _error(one) < _error(other) or one.cost < other.cost * (1.0 - SLACK) or j < k
+def _dominates(one: Measured, other: Measured) -> bool:
+    """Whether `one` errs less at no more cost."""
+    return _error(one) < _error(other) and one.cost <= other.cost * (1.0 + SLACK)
 
 
 def _plain(point: dict[str, Any]) -> dict[str, Any]:

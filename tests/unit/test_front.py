@@ -93,3 +93,13 @@ def test_what_is_shipped_is_whole():
     assert {len(row[name]) for row in scene["scenes"] for name in ("errors", "seconds", "residuals")} == {
         len(scene["settings"])
     }
+
+
+def test_equal_errors_never_dominate_one_another_in_a_circle():
+    """Costs 1, 0.97, 0.94 of one error: each is equal to its neighbour, the last is cheaper than the first; one of them has to stay."""
+    for costs in ((1.0, 0.97, 0.94), (0.94, 0.97, 1.0), (1.0, 0.94, 0.97), (1.08, 1.04, 1.0, 1.02)):
+        points = tuple(Measured(setting={"k": k}, cost=c, error=1e-14) for k, c in enumerate(costs))
+        front = Front(kind="law", subject="s", measure="m", cost="s", points=points)
+        assert len(front.efficient) == 1
+        assert points[front.efficient[0]].cost <= 1.05 * min(costs)
+        assert front.cheapest(1e-6) is points[front.efficient[0]]

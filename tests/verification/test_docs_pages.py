@@ -22,6 +22,7 @@ REFERENCE = ("reference/messages.md",)  # what the program itself is asked for
 # Seconds for their cells, on one core and with code compiled before: `make test` runs these, `make validate` all others.
 QUICK = (
     "tutorials/corners.md",
+    "tutorials/finite_elements.md",
     "tutorials/first_law.md",
     "tutorials/own_contact_law.md",
     "tutorials/thermal_law.md",
