@@ -5,19 +5,22 @@ Positions are those of the mid configuration of the leap-frog form of Moreau–J
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..notebook import Summary
 
 __all__ = ["Assembly"]
 
 Array = NDArray[np.float64]
 
 
-@dataclass
-class Assembly:
+@dataclass(repr=False)
+class Assembly(Summary):
     """Everything a step needs and nothing that it can derive; arrays over bodies (n), links (m), candidates (c), planes (k).
 
     In two dimensions (d = 2) bodies are disks and nothing has a third component; `spin` then has one column. Where no body turns it has
@@ -25,6 +28,22 @@ class Assembly:
     lengths inf: no box. A body of infinite mass is fixed, or goes on with the velocity it has (the work that takes is in no term of the
     energy).
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "x": "m",
+        "radius": "m",
+        "mass": "kg",
+        "velocity": "m/s",
+        "spin": "m/s",
+        "half": "m",
+        "box_velocity": "m/s",
+        "box_mass": "kg",
+        "plane_place": "m",
+        "plane_velocity": "m/s",
+        "link_length": "m",
+        "link_impulse": "N s",
+        "pair_impulse": "N s",
+    }
 
     x: Array  # (n, d) centres [m]
     radius: Array  # (n,) [m]
@@ -53,6 +72,9 @@ class Assembly:
     step: float = 0.0  # the step that the impulses belong to [s]; 0: none yet
     elastic_energy: float = 0.0  # stored in contacts and links [J]
     time: float = 0.0  # [s]
+
+    def _title(self) -> str:
+        return f"{len(self.x)} bodies, {len(self.links)} links, {len(self.pairs)} candidates"
 
     @classmethod
     def of_spheres(

@@ -6,11 +6,14 @@ Leaving one octant out is then a reweighting, which gives the spread within a sa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..notebook import Summary
 
 __all__ = ["PhaseHistory", "TriaxialRecord", "mandel"]
 
@@ -27,14 +30,26 @@ def mandel(tensor: Array) -> Array:
     return out
 
 
-@dataclass(frozen=True, kw_only=True)
-class PhaseHistory:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class PhaseHistory(Summary):
     """Stress and strain of each phase along one test; tension positive, Mandel components, shape (frame_count, 6).
 
     Strains [-] count from the start of the test (isotropic state at `pressure`, links just switched on); stresses [Pa] are
     whole (they start near -pressure in the grains). `stress_beads` is what the grain contacts of the beads carry:
     split "total": sand = grains, wire = links + beads; split "links": sand = grains + beads, wire = links.
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "axial_strain": "-",
+        "wall_strain": "-",
+        "strain_sand": "-",
+        "strain_wire": "-",
+        "wall_stress": "Pa",
+        "stress_grains": "Pa",
+        "stress_beads": "Pa",
+        "stress_links": "Pa",
+    }
 
     pressure: float  # confining pressure [Pa], positive
     linked: bool  # False: the control with the same beads unlinked
@@ -48,6 +63,9 @@ class PhaseHistory:
     stress_beads: Array
     stress_links: Array
 
+    def _title(self) -> str:
+        return f"a test at {self.pressure / 1e3:g} kPa by phase, {len(self.leg)} frames"
+
     def stress_sand(self, split: str = "links") -> Array:
         """Stress of the sand phase under a split of the bead contacts ("links" or "total")."""
         return self.stress_grains + self.stress_beads if split == "links" else self.stress_grains
@@ -57,9 +75,21 @@ class PhaseHistory:
         return self.stress_links if split == "links" else self.stress_links + self.stress_beads
 
 
-@dataclass(frozen=True, kw_only=True)
-class TriaxialRecord:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class TriaxialRecord(Summary):
     """One test of one sample at one pressure, with the octant sums that give `PhaseHistory` for any octant weights."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "axial_strain": "-",
+        "wall_strain": "-",
+        "wall_stress": "Pa",
+        "box_stress": "Pa",
+        "octant_volume": "m³",
+        "grain_moment": "J",
+        "bead_moment": "J",
+        "link_moment": "J",
+    }
 
     pressure: float
     seed: int
@@ -78,6 +108,9 @@ class TriaxialRecord:
     series: dict[str, Array] = field(default_factory=dict)  # (frame_count,) measures of `dem.residual`, energies summed
     quality: dict[str, float] = field(default_factory=dict)
     settings: dict[str, Any] = field(default_factory=dict)
+
+    def _title(self) -> str:
+        return f"record of a test at {self.pressure / 1e3:g} kPa, {len(self.leg)} frames"
 
     def history(self, octant_weights: Array | None = None) -> PhaseHistory:
         """Homogenised histories; `octant_weights`, shape (8,), default all one."""

@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..potentials import Law
 from .dimension import SPACE, Dimension
 from .packing import StatePacking
+from .summary import step_words
 from .thermal import thermal_input
 
 __all__ = ["CompiledStep", "packed_values", "step_time"]
@@ -22,7 +23,7 @@ __all__ = ["CompiledStep", "packed_values", "step_time"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class CompiledStep:
     """Generated `module` of `law`; `layout` gives the place of each internal variable in a packed state row."""
 
@@ -34,6 +35,9 @@ class CompiledStep:
     state_size: int = 0
     why: str = ""
     dimension: Dimension = SPACE
+
+    def __repr__(self) -> str:
+        return step_words(self)
 
     @cached_property
     def packing(self) -> StatePacking:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError, Status
+from ..notebook import Summary
 from ..potentials import Law
 from ..potentials.spectral import as_matrix, from_matrix
 from .batch import ROUNDING, BatchSolution, interior_start, slopes_of, solve_batch
@@ -30,16 +31,25 @@ UNPOLISHED = 1e-4  # mismatch over the size of the data up to which an answer wi
 LOOSE = 100.0  # times a tolerance that was asked for, which clarabel means in its own scaling
 
 
-@dataclass(frozen=True)
-class ConicSolution:
+@dataclass(frozen=True, repr=False)
+class ConicSolution(Summary):
     """Solution of one step: `stress` [Pa] (6,), `state` by name, `objective` W = ψ + dt φ [J/m³], `status` text of clarabel and the
     `residual`, the natural map of the program relative to its data (zero at the solution and nowhere else)."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "stress": "Pa",
+        "objective": "J/m³",
+        "residual": "-",
+    }
 
     stress: np.ndarray
     state: dict[str, Any]
     objective: float
     status: str
     residual: float
+
+    def _title(self) -> str:
+        return f"step of a cone program: {self.status}"
 
 
 @dataclass(frozen=True)

@@ -24,6 +24,7 @@ from .general_step import TOLERANCE, GeneralStep, StepSolution
 from .packing import StatePacking
 from .sensitivity import Sensitivities, sensitivities
 from .step_result import StepResult
+from .summary import step_words
 from .thermal import thermal_input, thermal_results
 from .threads import checked_threads
 
@@ -53,6 +54,9 @@ class GeneralUpdate:
     threads: int = 1
     tolerance: float = TOLERANCE
     _steps: dict[Any, GeneralStep] = field(default_factory=dict, compare=False, repr=False)
+
+    def __repr__(self) -> str:
+        return step_words(self)
 
     @classmethod
     def of(

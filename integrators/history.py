@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +30,9 @@ from .stress_update import StressUpdate
 from .summary import array_rows, as_html, as_text, status_words
 from .thermal import thermal_input, thermal_results
 from .update import Update
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 __all__ = ["History", "Plan", "drive_arrays", "path_plan", "time_steps"]
 
@@ -56,6 +59,26 @@ class History:
     temperature: Array | None = None
     entropy: Array | None = None
     iterations: Array | None = None
+
+    def plot(
+        self,
+        *,
+        component: str | None = None,
+        measure: str = "q",
+        signs: str = "tension-positive",
+        title: str = "",
+    ) -> Figure:
+        """A figure of the path; `history.plot().savefig("path.svg")`, and a notebook shows it.
+
+        Four panels: stress against strain of one `component` ("11" … "12", of the tensor: shear neither doubled nor Mandel; by default the
+        one that moves most), the equivalent stress against the mean stress, the volume strain, and the energies stored and dissipated
+        [J/m³] against the length of the strain path. `measure` is "q" for q = √(3 J₂) or "sqrt_J2" for √J₂; `signs` turns the axes
+        ("compression-positive"). The first row is an open circle, the last a filled one. Raises `InputError` for a word that is none of
+        these.
+        """
+        from .history_figure import history_figure
+
+        return history_figure(self, component=component, measure=measure, signs=signs, title=title)
 
     def _summary(self) -> tuple[str, list[tuple[str, ...]]]:
         names = ("eps", "sig", "psi", "dissipation", "temperature", "entropy", "iterations")

@@ -10,13 +10,15 @@ from __future__ import annotations
 
 import csv
 import math
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
 from ..errors import InputError, StorageError
+from ..notebook import Summary
 from .history import History
 
 __all__ = ["COMPONENTS", "StrainStressPath", "read_path", "write_history"]
@@ -26,10 +28,15 @@ MANDEL = np.array([1.0, 1.0, 1.0, math.sqrt(2.0), math.sqrt(2.0), math.sqrt(2.0)
 _KNOWN = ("t", *(f"eps_{c}" for c in COMPONENTS), *(f"sig_{c}" for c in COMPONENTS), "eps_v", "p", "T")
 
 
-@dataclass(frozen=True)
-class StrainStressPath:
+@dataclass(frozen=True, repr=False)
+class StrainStressPath(Summary):
     """Prescribed path: `time` (n,); `control` (6,) True where stress is prescribed; `targets` (n, 6) Mandel; trace condition;
     `temperature` (n,) [K] or None."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "time": "s",
+        "temperature": "K",
+    }
 
     time: np.ndarray
     control: np.ndarray
@@ -37,6 +44,9 @@ class StrainStressPath:
     trace: str | None = None
     trace_targets: np.ndarray | None = None
     temperature: np.ndarray | None = None
+
+    def _title(self) -> str:
+        return f"a path of {len(self.time)} rows"
 
 
 def read_path(file: str | Path) -> StrainStressPath:

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..notebook import Summary
 from .compiled_step import packed_values, step_time
 from .dimension import SPACE, require_space
 from .failures import raise_failures
@@ -28,15 +29,23 @@ Array = NDArray[np.float64]
 BLOCK = 4096
 
 
-@dataclass(frozen=True)
-class Sensitivities:
+@dataclass(frozen=True, repr=False)
+class Sensitivities(Summary):
     """Derivatives at n points by the k parameters `names`, per unit of each: `stress` (n, 6, k) [Pa per unit], Mandel; `state` by name,
     tensors (n, 6, k), scalars (n, k); `dissipation` of the step (n, k) [J/m³ per unit]."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "stress": "Pa/unit",
+        "dissipation": "J/m³/unit",
+    }
 
     names: tuple[str, ...]
     stress: Array
     state: dict[str, Array]
     dissipation: Array
+
+    def _title(self) -> str:
+        return f"derivatives by {', '.join(self.names)}"
 
 
 def chosen_names(law: Any, wrt: Any) -> tuple[str, ...]:

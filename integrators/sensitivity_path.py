@@ -11,12 +11,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, InputError
+from ..notebook import Summary
 from .dimension import require_space
 from .general_update import GeneralUpdate
 from .history import History, drive_arrays, path_plan, time_steps
@@ -29,10 +30,16 @@ Array = NDArray[np.float64]
 LIMIT = 1e-10
 
 
-@dataclass(frozen=True)
-class PathSensitivities:
+@dataclass(frozen=True, repr=False)
+class PathSensitivities(Summary):
     """Derivatives by the k parameters `names` at the n rows of `history`, per unit of each: `eps` [1/unit], `sig` [Pa/unit] (n, 6, k),
     Mandel; `state` by name, tensors (n, 6, k), scalars (n, k); `dissipation`, accumulated [J/m³ per unit] (n, k)."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "eps": "1/unit",
+        "sig": "Pa/unit",
+        "dissipation": "J/m³/unit",
+    }
 
     names: tuple[str, ...]
     eps: Array
@@ -40,6 +47,9 @@ class PathSensitivities:
     state: dict[str, Array]
     dissipation: Array
     history: History
+
+    def _title(self) -> str:
+        return f"derivatives by {', '.join(self.names)} along a path"
 
 
 def path_sensitivities(

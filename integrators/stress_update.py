@@ -36,7 +36,7 @@ __all__ = ["StressUpdate", "build_stress_update"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class StressUpdate(CompiledStep):
     """Compiled step of `law` from stresses; `layout` gives the place of each internal variable in a packed state row.
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import Status
 from ..notebook import array_cells, html_table, text_table
 
-__all__ = ["HEADS", "array_rows", "as_html", "as_text", "status_words"]
+__all__ = ["HEADS", "array_rows", "as_html", "as_text", "status_words", "step_words"]
 
 HEADS = ("", "unit", "shape", "range")
 UNITS = {
@@ -56,3 +56,16 @@ def as_text(title: str, rows: list[tuple[str, ...]]) -> str:
 def as_html(title: str, rows: list[tuple[str, ...]], heads: tuple[str, ...] = HEADS) -> str:
     """For a notebook."""
     return html_table(title, heads, rows)
+
+
+def step_words(update: Any) -> str:
+    """What a step is: "step of 'sand', 3d, driven by the strain, solver 'reduced' (why)"."""
+    by = getattr(update, "formulation", "strain")
+    dimension = getattr(getattr(update, "dimension", None), "name", "3d")
+    settings = [
+        f"{word} {value}" for word in ("precision", "threads") if (value := getattr(update, word, None)) is not None
+    ]
+    why = getattr(update, "why", "")
+    return f"step of '{update.law.name}', {dimension}, driven by the {by}, " + ", ".join(
+        [f"solver '{update.solver}'" + (f" ({why})" if why else ""), *settings]
+    )

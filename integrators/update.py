@@ -41,7 +41,7 @@ GENERAL = ("general", "conic", "cvxpy")
 EXPLICIT = "explicit"
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, repr=False)
 class Update(CompiledStep):
     """Compiled implicit step of a law, driven by the strain; `precision` of its arrays, `threads` that share the points."""
 

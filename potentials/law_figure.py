@@ -6,21 +6,17 @@ Everything drawn is a number of the declaration: the curves of `surface` and `en
 from __future__ import annotations
 
 from collections.abc import Mapping
-from functools import partial
-from io import BytesIO
 from typing import Any
 
+from ..drawing import FAINT, INK, MEASURES, Signs, shown, styled
 from ..errors import DeclarationError, InputError
 from .convex_section import USUAL
 from .elastic_domain import Domain, domain_of
-from .energy_pair import energy_pair
+from .energy_pair import EnergyPair, energy_pair
 from .history_path import Path, path_of
 from .law import Law
 from .law_panels import (
     DASHES,
-    FAINT,
-    INK,
-    MEASURES,
     Curve,
     Drawing,
     deviatoric_panel,
@@ -30,32 +26,9 @@ from .law_panels import (
 )
 from .surface import COMPRESSION, Section, deviator, section_of
 
-__all__ = ["SIGNS", "law_figure", "picture"]
+__all__ = ["law_figure"]
 
-SIGNS = ("tension-positive", "compression-positive")
 LEVELS = (0.5, 1.0, 1.5)
-STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "axes.titlesize": 9.0,
-    "axes.titlelocation": "left",
-    "axes.edgecolor": FAINT,
-    "axes.labelcolor": INK,
-    "axes.linewidth": 0.6,
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.grid": True,
-    "axes.axisbelow": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.5,
-    "lines.linewidth": 1.5,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "figure.dpi": 100,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "fenchel",
-}
 
 
 def law_figure(
@@ -74,51 +47,41 @@ def law_figure(
     signs: str = "tension-positive",
 ) -> Any:
     """The `matplotlib.figure.Figure` of a law; see `Law.plot`, whose options these are (here a parameter may be called like one)."""
-    import matplotlib
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    if signs not in SIGNS:
-        raise InputError(f"signs = {signs!r} is unknown: use {' or '.join(map(repr, SIGNS))}")
+    factor = Signs(signs).factor
     if measure not in MEASURES:
         raise InputError(f"measure = {measure!r} is unknown: use {' or '.join(map(repr, MEASURES))}")
     if history is not None and state is not None:
         raise InputError("give a history, whose last row is the state, or a state, not both")
-    factor = 1.0 if signs == SIGNS[0] else -1.0
     path = None if history is None else path_of(law, values, history)
     now = state if path is None else path.state
     if strain is None:
         strain = 1e-3 if path is None else max(path.largest_strain, 1e-12)
     pair = energy_pair(law, values, direction=direction, strain=strain, state=now)
     drawing = _drawing(law, values, now, path, factor, measure, pressure, angle, size, limit)
-    with matplotlib.rc_context(STYLE):
-        rows = 2 if drawing is not None and drawing.curves else 1
-        figure = Figure(figsize=(7.6, 3.7 * rows + 0.5), layout="constrained")
-        FigureCanvasAgg(figure)
-        axes = figure.subplots(rows, 2, squeeze=False)
-        notes = energy_panels(axes[-1], pair, direction, factor)
-        if drawing is not None:
-            if rows == 2:
-                meridian_panel(axes[0, 0], drawing)
-                deviatoric_panel(axes[0, 1], drawing)
-                handles, labels = axes[0, 0].get_legend_handles_labels()
-                figure.legend(handles, labels, loc="outside upper right", ncols=2 if len(labels) > 3 else len(labels))
-            notes = drawing.notes + notes
-        notes = [_values_line(values), *notes] if values else notes
-        figure.suptitle(law.name, fontsize=10.0, fontweight="bold", x=0.01, ha="left")
-        figure.supxlabel("\n".join(_wrapped(notes)), fontsize=8.0, x=0.01, ha="left", color=INK)
-    figure._repr_png_ = partial(picture, figure)  # type: ignore[attr-defined]  # a notebook shows it without pyplot
-    return figure
+    return _panels(law, values, drawing, pair, direction, factor)
 
 
-def picture(figure: Any, kind: str = "png") -> bytes:
-    """The figure as PNG or SVG bytes, the same bytes for the same figure."""
-    import matplotlib
+@styled
+def _panels(
+    law: Law, values: Mapping[str, Any], drawing: Drawing | None, pair: EnergyPair, direction: Any, factor: float
+) -> Any:
+    from matplotlib.figure import Figure
 
-    buffer = BytesIO()
-    with matplotlib.rc_context(STYLE):
-        figure.savefig(buffer, format=kind, dpi=100, metadata={"Date": None} if kind == "svg" else {"Software": None})
-    return buffer.getvalue()
+    rows = 2 if drawing is not None and drawing.curves else 1
+    figure = Figure(figsize=(7.6, 3.7 * rows + 0.5), layout="constrained")
+    axes = figure.subplots(rows, 2, squeeze=False)
+    notes = energy_panels(axes[-1], pair, direction, factor)
+    if drawing is not None:
+        if rows == 2:
+            meridian_panel(axes[0, 0], drawing)
+            deviatoric_panel(axes[0, 1], drawing)
+            handles, labels = axes[0, 0].get_legend_handles_labels()
+            figure.legend(handles, labels, loc="outside upper right", ncols=2 if len(labels) > 3 else len(labels))
+        notes = drawing.notes + notes
+    notes = [_values_line(values), *notes] if values else notes
+    figure.suptitle(law.name, fontsize=10.0, fontweight="bold", x=0.01, ha="left")
+    figure.supxlabel("\n".join(_wrapped(notes)), fontsize=8.0, x=0.01, ha="left", color=INK)
+    return shown(figure)
 
 
 # -- what is drawn ------------------------------------------------------------------------------------------------------------------

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..drawing import BLUE, FAINT, GREEN, INK, MEASURES, PURPLE, SKY, VERMILION, unit_scale
 from .energy_pair import EnergyPair
 from .history_path import Path
 from .law import Law
@@ -13,9 +14,6 @@ from .surface import Section
 
 __all__ = [
     "DASHES",
-    "FAINT",
-    "INK",
-    "MEASURES",
     "Curve",
     "Drawing",
     "deviatoric_panel",
@@ -24,11 +22,8 @@ __all__ = [
     "meridian_panel",
 ]
 
-MEASURES = {"sqrt_J2": (1.0, r"$\sqrt{J_2}$"), "q": (3.0**0.5, r"$q=\sqrt{3J_2}$")}
-# Okabe and Ito 2008: told apart by readers of every kind of colour vision; lines differ in their dashes too
-BLUE, ORANGE, GREEN, PURPLE, SKY = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9"
 COLOURS, DASHES = (BLUE, PURPLE, GREEN, SKY), ("-", "--", "-.", ":")
-INK, FAINT, FILL = "#222222", "#8a8a8a", "#eef3f7"
+FILL = "#eef3f7"
 
 
 @dataclass
@@ -63,11 +58,11 @@ class Curve:
 def meridian_panel(ax: Any, drawing: Drawing) -> None:
     import numpy as np
 
-    scale, unit = _unit(_largest(drawing, 0))
+    scale, unit = unit_scale(_largest(drawing, 0))
     size, name = MEASURES[drawing.measure]
 
     def place(points: Any) -> Any:
-        return np.column_stack([drawing.factor * points[:, 0], size * points[:, 1]]) / scale
+        return np.column_stack([drawing.factor * points[:, 0], size * points[:, 1]]) * scale
 
     symbol = drawing.symbol
     _curves(ax, drawing, 0, place)
@@ -89,18 +84,18 @@ def meridian_panel(ax: Any, drawing: Drawing) -> None:
 def deviatoric_panel(ax: Any, drawing: Drawing) -> None:
     import numpy as np
 
-    scale, unit = _unit(_largest(drawing, 1))
+    scale, unit = unit_scale(_largest(drawing, 1))
 
     def place(points: Any) -> Any:
         # the first axis up, the others 120 degrees on
-        return drawing.factor * np.column_stack([-points[:, 1], points[:, 0]]) / scale
+        return drawing.factor * np.column_stack([-points[:, 1], points[:, 0]]) * scale
 
     _curves(ax, drawing, 1, place)
     if drawing.path is not None:
         section = next((c.deviatoric for c in drawing.curves[::-1] if c.deviatoric is not None), None)
         if section is not None:
             _walk(ax, place(section.coordinates(drawing.path.tensors)))
-    reach = _largest(drawing, 1) / scale
+    reach = _largest(drawing, 1) * scale
     for k in range(3):
         turn = 2.0 * np.pi * k / 3.0
         end = 1.15 * reach * np.array([-np.sin(turn), np.cos(turn)])
@@ -111,7 +106,8 @@ def deviatoric_panel(ax: Any, drawing: Drawing) -> None:
     ax.set_xlim(-1.5 * reach, 1.5 * reach)
     ax.set_ylim(-1.3 * reach, 1.5 * reach)
     ax.set_aspect("equal")
-    mean = f"{0.0 - drawing.factor * drawing.pressure / _unit(abs(drawing.pressure))[0]:.4g} {_unit(abs(drawing.pressure))[1]}"
+    size, multiple = unit_scale(abs(drawing.pressure))
+    mean = f"{0.0 - drawing.factor * drawing.pressure * size:.4g} {multiple}"
     name = rf"$\mathrm{{tr}}\,{drawing.symbol}/3$" if drawing.factor > 0 else "$p$"
     word = "" if drawing.factor > 0 else "\n(compression +)"
     ax.set_title(f"Deviatoric plane, {name} = {mean}")
@@ -160,9 +156,9 @@ def _label(law: Law, curve: Curve, section: Section, kind: int) -> str:
 
 
 def _walk(ax: Any, points: Any) -> None:
-    ax.plot(points[:, 0], points[:, 1], color=ORANGE, linewidth=1.2, label="path", zorder=3)
-    ax.plot(*points[0], marker="o", markersize=4, markerfacecolor="white", color=ORANGE, zorder=4)
-    ax.plot(*points[-1], marker="o", markersize=4, color=ORANGE, zorder=4)
+    ax.plot(points[:, 0], points[:, 1], color=VERMILION, linewidth=1.2, label="path", zorder=3)
+    ax.plot(*points[0], marker="o", markersize=4, markerfacecolor="white", color=VERMILION, zorder=4)
+    ax.plot(*points[-1], marker="o", markersize=4, color=VERMILION, zorder=4)
 
 
 def energy_panels(axes: Any, pair: EnergyPair, direction: Any, factor: float) -> list[str]:
@@ -172,31 +168,31 @@ def energy_panels(axes: Any, pair: EnergyPair, direction: Any, factor: float) ->
     left, right = axes
     rest = float(pair.at_rest)
     star = pair.stress * pair.strain - (pair.energy - rest)
-    energy_scale, energy_unit = _unit(float(np.abs(np.concatenate([pair.energy - rest, star])).max()), "J/m³")
-    stress_scale, stress_unit = _unit(float(np.abs(pair.stress).max()))
-    t, s = factor * 100.0 * pair.strain, factor * pair.stress / stress_scale
-    psi, star = (pair.energy - rest) / energy_scale, star / energy_scale
+    energy_scale, energy_unit = unit_scale(float(np.abs(np.concatenate([pair.energy - rest, star])).max()), "J/m³")
+    stress_scale, stress_unit = unit_scale(float(np.abs(pair.stress).max()))
+    t, s = factor * 100.0 * pair.strain, factor * pair.stress * stress_scale
+    psi, star = (pair.energy - rest) * energy_scale, star * energy_scale
     left.plot(t, psi, color=BLUE)
     right.plot(s, star, color=GREEN, linewidth=1.5)
     if pair.how == "numerical":
-        right.plot(s, (pair.conjugate + rest) / energy_scale, "o", markersize=3.5, color=INK)
+        right.plot(s, (pair.conjugate + rest) * energy_scale, "o", markersize=3.5, color=INK)
     # the point that is marked: well inside the picture, on a side where the stress is not zero
     inside = (np.abs(t) <= 0.7 * np.abs(t).max()) & (s != 0.0)
     place = int(np.argmax(np.where(inside & (t > 0.0), t, np.where(inside, -1.0 / (1.0 + np.abs(t)), -2.0))))
     for ax, x, y, slope in (
-        (left, t, psi, pair.stress[place] / energy_scale * factor / 100.0),
-        (right, s, star, pair.strain[place] / energy_scale * factor * stress_scale),
+        (left, t, psi, pair.stress[place] * energy_scale * factor / 100.0),
+        (right, s, star, pair.strain[place] * energy_scale * factor / stress_scale),
     ):
         reach = 1.15 * x[place]
         ax.plot(
             [0.0, reach],
             [y[place] - slope * x[place], y[place] + slope * (reach - x[place])],
-            color=ORANGE,
+            color=VERMILION,
             linewidth=1.0,
             linestyle="--",
         )
-        ax.plot(x[place], y[place], "o", markersize=4.5, color=ORANGE)
-        ax.plot(0.0, y[place] - slope * x[place], "_", markersize=9, color=ORANGE)
+        ax.plot(x[place], y[place], "o", markersize=4.5, color=VERMILION)
+        ax.plot(0.0, y[place] - slope * x[place], "_", markersize=9, color=VERMILION)
         ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=1)
         ax.axvline(0.0, color=FAINT, linewidth=0.8, zorder=1)
     strain, stress = _direction_words(direction)
@@ -207,7 +203,7 @@ def energy_panels(axes: Any, pair: EnergyPair, direction: Any, factor: float) ->
     right.set_ylabel(rf"$\rho\psi^*$ [{energy_unit}]")
     left.set_title("Free energy")
     right.set_title(r"Its conjugate, at $\sigma=\rho\,\partial\psi/\partial\varepsilon$")
-    a, b = psi[place], pair.stress[place] * pair.strain[place] / energy_scale
+    a, b = psi[place], pair.stress[place] * pair.strain[place] * energy_scale
     c = b - a
     notes = [
         f"Fenchel–Young at the marked point: ψ + ψ* = {a:.4g} + {c:.4g} = {b:.4g} {energy_unit} = σ:ε.",
@@ -241,16 +237,9 @@ def _largest(drawing: Drawing, which: int) -> float:
     return max(reached, default=1.0)
 
 
-def _unit(largest: float, base: str = "Pa") -> tuple[float, str]:
-    for factor, prefix in ((1e9, "G"), (1e6, "M"), (1e3, "k")):
-        if largest >= factor:
-            return factor, prefix + base
-    return 1.0, base
-
-
 def engineered(value: float, base: str = "Pa") -> str:
-    scale, unit = _unit(abs(value), base)
-    return f"{value / scale:.3g} {unit}"
+    scale, unit = unit_scale(abs(value), base)
+    return f"{scale * value:.3g} {unit}"
 
 
 def _lode(degrees: float) -> str:

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing import unit_scale
 from ...errors import InputError
 from ..measures import Network
 from ..storage import replace_file
@@ -19,20 +20,12 @@ from ..storage import replace_file
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["colours_on_white", "draw_networks", "unit_scale", "write_image", "write_picture"]
+__all__ = ["colours_on_white", "draw_networks", "write_image", "write_picture"]
 
 Array = NDArray[np.float64]
 
 _AXES = "xyz"
 _FULL = 4.0  # forces above this many means are drawn alike
-
-
-def unit_scale(size: float, unit: str) -> tuple[float, str]:
-    """Factor and name of the multiple of a unit in which a positive size reads best."""
-    for factor, prefix in ((1.0, ""), (1e3, "m"), (1e6, "µ")):
-        if size * factor >= 1.0:
-            return factor, prefix + unit
-    return 1e9, "n" + unit
 
 
 def draw_networks(network: Network, *, view: str = "xz", thickness: float | None = None) -> Figure:

@@ -9,63 +9,22 @@ The colours are those of Okabe and Ito, which read with colour-blind eyes; no cu
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from functools import wraps
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import InputError
+from ...drawing import INK, LOOKS, WALKED, Signs, shown, styled, unit_scale, walked
 from ..measures import Network, active_length, permutation_test
 from ..record import TriaxialRecord
-from .picture import unit_scale
 from .sample_panel import FLAT, draw_sample, seen_shape
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["SIGNS", "motion_figure", "sample_figure", "slope_figure", "triaxial_figure"]
+__all__ = ["motion_figure", "sample_figure", "slope_figure", "triaxial_figure"]
 
 Array = NDArray[np.float64]
-
-SIGNS = ("tension-positive", "compression-positive")
-_BLUE, _RED, _GREEN, _PURPLE, _INK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
-_LOOKS: tuple[dict[str, Any], ...] = (
-    {"color": _BLUE, "linestyle": "-"},
-    {"color": _RED, "linestyle": "--"},
-    {"color": _GREEN, "linestyle": "-."},
-    {"color": _PURPLE, "linestyle": ":"},
-    {"color": _INK, "linestyle": (0, (6, 1, 1, 1, 1, 1))},
-)
-_STYLE: dict[Any, Any] = {
-    "font.size": 9.0,
-    "font.family": "sans-serif",
-    "font.sans-serif": ["DejaVu Sans"],
-    "axes.spines.top": False,
-    "axes.spines.right": False,
-    "axes.linewidth": 0.6,
-    "axes.grid": True,
-    "grid.color": "#e6e6e6",
-    "grid.linewidth": 0.5,
-    "axes.axisbelow": True,
-    "lines.linewidth": 1.3,
-    "legend.frameon": False,
-    "legend.fontsize": 8.0,
-    "svg.fonttype": "path",
-    "svg.hashsalt": "fenchel",
-}
-
-
-def _styled(draw: Callable[..., Figure]) -> Callable[..., Figure]:
-    @wraps(draw)
-    def run(*arguments: Any, **options: Any) -> Figure:
-        import matplotlib
-
-        with matplotlib.rc_context(_STYLE):
-            return draw(*arguments, **options)
-
-    return run
 
 
 def _canvas(network: Network, rows: int, columns: int, options: dict[str, Any]) -> tuple[Figure, list[Any]]:
@@ -94,12 +53,6 @@ def _legend_above(panel: Any, columns: int) -> None:
     panel.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=columns, columnspacing=1.2, handlelength=2.4)
 
 
-def _check_signs(signs: str) -> float:
-    if signs not in SIGNS:
-        raise InputError(f'signs = "{signs}" is unknown: use "tension-positive" or "compression-positive"')
-    return 1.0 if signs == SIGNS[0] else -1.0
-
-
 def _equivalent(stress: Array) -> Array:
     """√J₂ [Pa] of stresses in Mandel components, shape (frame_count, 6)."""
     deviator = stress.copy()
@@ -118,43 +71,41 @@ def _legs(record: TriaxialRecord) -> list[tuple[str, slice]]:
     return found
 
 
-@_styled
+@styled
 def triaxial_figure(network: Network, record: TriaxialRecord, title: str, signs: str, **sample: Any) -> Figure:
     """A finished test: sample, √J₂ against strain, √J₂ against p, volume strain, √J₂ by phase (sliding without wires)."""
-    sign = _check_signs(signs)
+    turned = Signs(signs)
     figure, (stress, path, volume, phases) = _canvas(network, 2, 2, sample)
-    axial = 100.0 * sign * record.axial_strain
-    axial_label = rf"axial strain $\varepsilon_{{zz}}$ [%] ({'extension' if sign > 0 else 'shortening'} +)"
+    axial = turned.percent(record.axial_strain)
     equivalent, p = _equivalent(record.wall_stress) / 1e3, -record.wall_stress[:, :3].mean(axis=1) / 1e3
-    dilation = 100.0 * sign * record.wall_strain[:, :3].sum(axis=1)
+    dilation = turned.percent(record.wall_strain[:, :3].sum(axis=1))
     for k, (name, frames) in enumerate(_legs(record)):
-        look = _LOOKS[k % len(_LOOKS)]
+        look = LOOKS[k % len(LOOKS)]
         stress.plot(axial[frames], equivalent[frames], label=name, **look)
         path.plot(p[frames], equivalent[frames], **look)
         volume.plot(axial[frames], dilation[frames], **look)
-    stress.set(xlabel=axial_label, ylabel=r"equivalent stress $\sqrt{J_2}$ [kPa]")
+    stress.set(xlabel=turned.axial, ylabel=r"equivalent stress $\sqrt{J_2}$ [kPa]")
     if len(stress.lines) > 1:
         legs = stress.get_legend_handles_labels()
         stress.figure.legend(*legs, loc="outside upper center", ncols=5)
     path.set(xlabel=r"mean pressure $p=-\mathrm{tr}\,\sigma/3$ [kPa]", ylabel=r"equivalent stress $\sqrt{J_2}$ [kPa]")
-    word = "dilation" if sign > 0 else "contraction"
-    volume.set(xlabel=axial_label, ylabel=rf"volume strain $\varepsilon_v$ [%] ({word} +)")
-    walked = 100.0 * np.concatenate([[0.0], np.cumsum(np.abs(np.diff(record.axial_strain)))])
+    volume.set(xlabel=turned.axial, ylabel=turned.volume)
+    length = walked(record.axial_strain)
     if len(record.bead_moment) and record.bead_moment.any():
         history = record.history()
         parts = [("grains", history.stress_grains), ("beads", history.stress_beads)]
         parts += [("wires", history.stress_links)] if record.linked else []
-        for look, (name, value) in zip(_LOOKS, parts, strict=False):
-            phases.plot(walked, _equivalent(value) / 1e3, label=name, **look)
-        phases.set(xlabel="axial strain walked [%]", ylabel=r"$\sqrt{J_2}$ of a phase [kPa]")
+        for look, (name, value) in zip(LOOKS, parts, strict=False):
+            phases.plot(length, _equivalent(value) / 1e3, label=name, **look)
+        phases.set(xlabel=WALKED, ylabel=r"$\sqrt{J_2}$ of a phase [kPa]")
         _legend_above(phases, 3)
     elif "sliding" in record.series:
-        phases.plot(walked, 100.0 * record.series["sliding"], **_LOOKS[0])
-        phases.set(xlabel="axial strain walked [%]", ylabel="contacts that slide [%]")
+        phases.plot(length, 100.0 * record.series["sliding"], **LOOKS[0])
+        phases.set(xlabel=WALKED, ylabel="contacts that slide [%]")
     else:
         phases.set_visible(False)
     figure.suptitle(f"{title}: confining pressure {record.pressure / 1e3:g} kPa{_active(network)}", fontsize=10)
-    return figure
+    return shown(figure)
 
 
 def _active(network: Network) -> str:
@@ -167,7 +118,7 @@ def _active(network: Network) -> str:
     return f"; active length {scale * found.length:.3g} {unit} ({found.radii:.3g} mean radii), by chance {scale * chance:.3g} {unit}"
 
 
-@_styled
+@styled
 def motion_figure(network: Network, content: dict[str, Any], title: str, **sample: Any) -> Figure:
     """A finished motion: sample, energies and residual against time."""
     figure, (energy, residual) = _canvas(network, 2, 1, sample)
@@ -179,42 +130,42 @@ def motion_figure(network: Network, content: dict[str, Any], title: str, **sampl
         "shock": "lost in shocks",
         "external": "work of weight and drives",
     }
-    shown = {name: np.asarray(frames[name]) for name in names if name in frames}
-    top = max((float(np.nanmax(np.abs(v), initial=0.0)) for v in shown.values()), default=0.0)
+    kept = {name: np.asarray(frames[name]) for name in names if name in frames}
+    top = max((float(np.nanmax(np.abs(v), initial=0.0)) for v in kept.values()), default=0.0)
     scale, unit = unit_scale(top, "J") if top > 0.0 else (1.0, "J")
-    for look, (name, value) in zip(_LOOKS, shown.items(), strict=False):
+    for look, (name, value) in zip(LOOKS, kept.items(), strict=False):
         energy.plot(frames["time"], scale * value, label=names[name], **look)
     energy.set(xlabel="time [s]", ylabel=f"energy [{unit}]")
     _legend_above(energy, 2)
     value = np.asarray(frames["natural_map"], dtype=float)
-    residual.plot(frames["time"], np.where(value > 0.0, value, np.nan), color=_INK)
+    residual.plot(frames["time"], np.where(value > 0.0, value, np.nan), color=INK)
     if (value > 0.0).any():
         residual.set_yscale("log")
     residual.set(xlabel="time [s]", ylabel="residual of a step [–]\n(natural map)")
     figure.suptitle(title, fontsize=10)
-    return figure
+    return shown(figure)
 
 
-@_styled
+@styled
 def slope_figure(network: Network, content: dict[str, Any], title: str, **sample: Any) -> Figure:
     """A finished deposit: sample, and the mean free surface with the angle of repose."""
     figure, (surface,) = _canvas(network, 1, 1, sample)
     profile, quality = content["profile"], content["quality"]
     size = max(float(np.max(profile["distance"], initial=0.0)), 1e-9)
     scale, unit = unit_scale(size, "m")
-    surface.plot(scale * profile["distance"], scale * profile["height"], **_LOOKS[0])
+    surface.plot(scale * profile["distance"], scale * profile["height"], **LOOKS[0])
     surface.set(xlabel=f"distance from the axis [{unit}]", ylabel=f"height of the free surface [{unit}]")
     surface.set_ylim(bottom=0.0)
     said = "too few bodies on the surface for a slope"
     if np.isfinite(quality["angle"]):
         said = f"angle of repose {quality['angle']:.1f}° ({quality['angle_low']:.1f}° to {quality['angle_high']:.1f}°)"
     figure.suptitle(f"{title}: {said}", fontsize=10)
-    return figure
+    return shown(figure)
 
 
-@_styled
+@styled
 def sample_figure(network: Network, title: str, **sample: Any) -> Figure:
     """The sample alone."""
     figure, _ = _canvas(network, 1, 0, sample)
     figure.suptitle(title, fontsize=10)
-    return figure
+    return shown(figure)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from ...errors import InputError
+from ...notebook import Summary, field_cells
 from ..bodies import Assembly
 from ..measures import Network
 from ..record import TriaxialRecord
@@ -26,13 +27,19 @@ __all__ = ["Export", "Run", "export_run", "network_of_run", "read_run"]
 Export = Literal["vtk", "xyz", "picture", "plot"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Run:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Run(Summary):
     """A run file in memory, finished or not: `read_run("run.h5")`."""
 
     path: Path
     content: dict[str, Any]  # what the file holds, by name; arrays in SI units, plain tensor components
     settings: dict[str, Any]  # what made it: the scene and what was chosen for it
+
+    def _title(self) -> str:
+        return f"{self.path.name}: {'a run that is not finished' if self.kind == 'unfinished' else self.kind}"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return [field_cells(name, "", value) for name, value in (self.content | {"settings": self.settings}).items()]
 
     @property
     def kind(self) -> str:

@@ -17,16 +17,16 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...drawing import unit_scale
 from ...errors import InputError
 from ..measures import Network
-from .picture import colours_on_white, unit_scale
+from .picture import colours_on_white
 
 __all__ = [
     "FLAT",
     "QUANTITIES",
     "body_values",
     "draw_sample",
-    "pressure_scale",
     "seen_shape",
     "value_range",
     "view_axes",
@@ -102,7 +102,7 @@ def value_range(values: Array, quantity: str) -> tuple[float, float, float, str]
     unit, _ = QUANTITIES[quantity]
     top = float(np.quantile(values, 0.98))
     bottom = float(values.min()) if quantity == "radius" else 0.0
-    scale, name = (1.0, "–") if unit == "1" else pressure_scale(top) if unit == "Pa" else unit_scale(top, unit)
+    scale, name = (1.0, "–") if unit == "1" else unit_scale(top, unit)
     if not top > bottom * (1.0 + 1e-9):  # all alike: one colour
         bottom, top = (0.0, top) if top > 0.0 else (0.0, 1.0 / scale)
     return scale * bottom, scale * top, scale, name
@@ -201,14 +201,6 @@ def _coloured(
         bar.locator.set_params(integer=True)
         bar.update_ticks()
     return bar
-
-
-def pressure_scale(size: float) -> tuple[float, str]:
-    """Factor and name of the multiple of the pascal in which a size reads best."""
-    for factor, name in ((1e-9, "GPa"), (1e-6, "MPa"), (1e-3, "kPa"), (1.0, "Pa"), (1e3, "mPa")):
-        if size * factor >= 1.0:
-            return factor, name
-    return (1.0, "Pa") if size == 0.0 else (1e6, "µPa")
 
 
 def _wires(panel: Any, lines: Array, tension: Array, width: float) -> None:

@@ -1,17 +1,21 @@
-"""Directive `law-library`: a section per law of the library, taken from the registry at build.
+"""The library of laws: a page per law, written from its declaration before the build reads its pages, and the directive `law-list`.
 
-Potentials, parameters, source and worked value come from the declaration and its entry, the text above them from the docstring of the file.
+Potentials, parameters, source and worked value come from the declaration and its entry, the text above them from the docstring of the
+file. The pages are notebooks: the picture, Table 1 and the worked step are computed when they are built, and a wrong one fails.
+They are not kept: `docs/reference/laws` is made anew, so that a law that is added to the registry has its page.
 """
 
 from __future__ import annotations
 
 import importlib
 import math
+import re
 import textwrap
+from collections.abc import Iterator, Mapping
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
-from file_keys import paragraph
 from prose import paragraphs
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -20,43 +24,128 @@ from sympy import latex
 from fenchel.potentials import Law
 from fenchel.potentials.library import ENTRIES, Entry
 
-HEADS = ("parameter", "symbol", "unit", "bounds", "value", "meaning")
-WIDTHS = (14, 10, 12, 14, 14, 36)
+HEAD = """\
+---
+file_format: mystnb
+kernelspec:
+  display_name: Python 3
+  name: python3
+---
+"""
+CELLS = """\
+## Its picture
+
+At the values above; *Look at a law* says what the panels show.
+
+```{{code-cell}} python
+from fenchel.potentials.library import ENTRIES
+
+entry = ENTRIES["{name}"]
+law, values, temperatures = entry.law, entry.values, entry.worked.temperatures
+law.plot(**values, **temperatures)
+```
+
+## Table 1
+
+```{{code-cell}} python
+law.table("strain")
+```
+
+```{{code-cell}} python
+law.table("stress")
+```
+
+## Is it admissible?
+
+Convexity of ψ and φ\\*, and with them a dissipation that is not negative, for all values within the bounds:
+
+```{{code-cell}} python
+report = law.check()
+assert report.admissible
+report
+```
+
+## A step whose answer is known
+
+{known}
+
+```{{code-cell}} python
+import numpy as np
+
+known = entry.worked
+step = law.conic(known.eps, None, dt=known.dt, **values, **temperatures).solve()
+difference = np.abs(step.stress - known.stress).max()
+print("stress [Pa], Mandel:", step.stress)
+print(f"largest difference from the known answer: {{difference:.1e}} Pa")
+assert difference <= 10.0 ** (2 - known.digits) * np.abs(known.stress).max()
+{state}```
+
+## Use it
+
+```python
+from fenchel.potentials.library import {name}
+
+update = {name}.compile("3d")  # compiled, for many points at once: update(eps, state, dt=..., **values)
+```
+
+```console
+$ fenchel show {name}
+$ fenchel drive {name} path.csv {words} -o history.csv
+```
+"""
+STATE = """\
+for variable, value in known.state.items():
+    assert np.allclose(step.state[variable], value, rtol=1e-9, atol=1e-12), variable
+"""
 
 
-class LawLibrary(SphinxDirective):
-    """One section per law, in the order of the registry."""
+def page(name: str, entry: Entry) -> str:
+    """The page of one law, as a notebook in Markdown."""
+    law = entry.law
+    text = importlib.import_module(f"fenchel.potentials.library._{name}").__doc__ or ""
+    words = " ".join(f"-p {key}={value:g}" for key, value in entry.values.items())
+    return "\n".join(
+        [
+            HEAD,
+            f"(law-{name})=",
+            f"# {name}",
+            "",
+            f"*{law.note[:1].upper()}{law.note[1:]}.* Source: {entry.source}.",
+            "",
+            *prose(text),
+            "## Declared",
+            "",
+            *displayed(rf"\psi = {latex(law.energy)}"),
+            *displayed(force_potential(law)),
+            *variables(law),
+            "## Parameters",
+            "",
+            *parameters(entry),
+            CELLS.format(name=name, known=known(entry), state=STATE if entry.worked.state else "", words=words),
+        ]
+    )
 
-    def run(self) -> list[nodes.Node]:
-        return [self.section(name, entry) for name, entry in ENTRIES.items()]
 
-    def section(self, name: str, entry: Entry) -> nodes.section:
-        law = entry.law
-        identifier = nodes.make_id(f"law-{name}")
-        section = nodes.section("", nodes.title(text=name), ids=[identifier], names=[identifier])
-        section += prose(importlib.import_module(f"fenchel.potentials.library._{name}").__doc__ or "")
-        section += formula(rf"\psi = {latex(law.energy)}")
-        section += formula(force_potential(law))
-        section += parameters(entry)
-        section += worked(entry)
-        return section
-
-
-def prose(text: str) -> list[nodes.Node]:
+def prose(text: str) -> Iterator[str]:
     """A docstring as paragraphs and indented formulas."""
-    found: list[nodes.Node] = []
     for lines in paragraphs(text.splitlines()):
         if lines[0].startswith(" "):
-            shown = textwrap.dedent("\n".join(lines))
-            found.append(nodes.literal_block(shown, shown, language="text"))
+            yield from ("```text", *textwrap.dedent("\n".join(lines)).splitlines(), "```", "")
         else:
-            found.append(paragraph(" ".join(lines)))
-    return found
+            yield from (escaped(" ".join(lines)), "")
 
 
-def formula(text: str) -> nodes.math_block:
+def escaped(text: str) -> str:
+    """Text in which Markdown sees no markup but `names`."""
+    pieces = text.split("`")
+    return "`".join(
+        piece if place % 2 else re.sub(r"([\\*_|$<\[])", r"\\\1", piece) for place, piece in enumerate(pieces)
+    )
+
+
+def displayed(text: str) -> Iterator[str]:
     """A displayed formula."""
-    return nodes.math_block(text, text, nowrap=False, number=None, label=None)
+    yield from ("```{math}", text, "```", "")
 
 
 def force_potential(law: Law) -> str:
@@ -66,57 +155,65 @@ def force_potential(law: Law) -> str:
     return r"\varphi^* = I_{\{0\}}" if law.phi_star is None else rf"\varphi^* = {law.phi_star.latex()}"
 
 
-def parameters(entry: Entry) -> nodes.table:
+def variables(law: Law) -> Iterator[str]:
+    """Which symbols are observable, internal, and their forces."""
+    said = f"Observable: ${latex(law.observable)}$."
+    if law.internal:
+        listed = ", ".join(rf"${latex(variable)}$ (force ${latex(law.forces[variable])}$)" for variable in law.internal)
+        said += f" Internal: {listed}."
+    if law.temperature is not None:
+        said += f" Temperature: ${latex(law.temperature)}$."
+    yield from (said, "")
+
+
+def parameters(entry: Entry) -> Iterator[str]:
     """Name, symbol, unit, bounds, the value of the worked example, meaning."""
-    rows = []
+    yield "| parameter | symbol | unit | bounds | value | meaning |"
+    yield "|---|---|---|---|---|---|"
     for symbol in entry.law.parameters:
-        bounds = f"[{symbol.lower:g}, {symbol.upper:g}]" if math.isfinite(symbol.upper) else f"≥ {symbol.lower:g}"
-        cells = (symbol.name, latex(symbol), symbol.unit, bounds, f"{entry.values[symbol.name]:g}", symbol.note)
-        rows.append(cells)
-    group = nodes.tgroup(cols=len(HEADS))
-    for width in WIDTHS:
-        group += nodes.colspec(colwidth=width)
-    head, body = nodes.thead(), nodes.tbody()
-    head += row([nodes.Text(word) for word in HEADS])
-    for name, tex, *rest in rows:
-        body += row([nodes.literal(text=name), nodes.math(text=tex), *(nodes.Text(text) for text in rest)])
-    group += head
-    group += body
-    return nodes.table("", group)
+        bounds = f"{symbol.lower:g} to {symbol.upper:g}" if math.isfinite(symbol.upper) else f"≥ {symbol.lower:g}"
+        cells = (f"`{symbol.name}`", f"${latex(symbol)}$", symbol.unit, bounds, f"{entry.values[symbol.name]:g}")
+        yield "| " + " | ".join((*cells, escaped(symbol.note))) + " |"
+    yield from ("", "The values are plausible, not measured: they are those of the picture and of the worked step.", "")
 
 
-def worked(entry: Entry) -> list[nodes.Node]:
-    """Source, and the worked value in a line each."""
+def known(entry: Entry) -> str:
+    """The worked value in words: the strain, what is given beside it, and where its answer comes from."""
     value = entry.worked
     given = f"Δt = {value.dt:g} s" + "".join(f", {k} = {v:g} K" for k, v in value.temperatures.items())
-    items = [
-        ("Source", entry.source),
-        ("Worked value", f"one implicit step from the virgin state at the values above, {given}"),
-        ("strain (Mandel)", listed(value.eps)),
-        ("stress (Mandel)", f"{listed(value.stress)} Pa"),
-        *((f"{name}", f"{v:.12g}" if isinstance(v, float) else listed(v)) for name, v in value.state.items()),
-        ("from", value.source),
-    ]
-    found = nodes.field_list()
-    for name, text in items:
-        found += nodes.field("", nodes.field_name(text=name), nodes.field_body("", nodes.paragraph(text=text)))
-    return [found]
+    strain = ", ".join(f"{x:.6g}" for x in value.eps)
+    return (
+        f"One implicit step from the virgin state, {given}, to the strain ({strain}), in Mandel components (11, 22, 33, √2·23, √2·13, "
+        f"√2·12). Its answer is known without fenchel: {escaped(value.source)}. The cone program of the declaration gives it too, and "
+        "the tests hold every compiled step of the law against it."
+    )
 
 
-def listed(numbers: Any) -> str:
-    """Six components to twelve digits."""
-    return "(" + ", ".join(f"{x:.12g}" for x in numbers) + ")"
+def write(folder: Path, entries: Mapping[str, Entry] = ENTRIES) -> None:
+    """One file per law; what is there and right is left alone, what belongs to no law is removed."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for old in folder.glob("*.md"):
+        if old.stem not in entries:
+            old.unlink()
+    for name, entry in entries.items():
+        file, text = folder / f"{name}.md", page(name, entry)
+        if not file.exists() or file.read_text(encoding="utf-8") != text:
+            file.write_text(text, encoding="utf-8")
 
 
-def row(cells: list[nodes.Node]) -> nodes.row:
-    """A row of one-paragraph cells."""
-    found = nodes.row()
-    for cell in cells:
-        found += nodes.entry("", nodes.paragraph("", "", cell))
-    return found
+class LawList(SphinxDirective):
+    """Every law of the library with its line, each a link to its page, in the order of the registry."""
+
+    def run(self) -> list[nodes.Node]:
+        lines = ["| law | what it is | source |", "|---|---|---|"]
+        for name, entry in ENTRIES.items():
+            lines.append(f"| [`{name}`](laws/{name}.md) | {escaped(entry.law.note)} | {escaped(entry.source)} |")
+        lines += ["", "```{toctree}", ":hidden:", "", *(f"laws/{name}" for name in ENTRIES), "```"]
+        return self.parse_text_to_nodes("\n".join(lines))
 
 
 def setup(sphinx: Sphinx) -> dict[str, Any]:
-    """Register the directive."""
-    sphinx.add_directive("law-library", LawLibrary)
+    """Write the pages before they are read, and register the directive."""
+    sphinx.connect("builder-inited", lambda app: write(Path(app.srcdir) / "reference" / "laws"))
+    sphinx.add_directive("law-list", LawList)
     return {"parallel_read_safe": True, "version": "1"}

@@ -5,11 +5,14 @@ A result that holds arrays is shown by shape, unit and range, never by its numbe
 
 from __future__ import annotations
 
+import dataclasses
 import html
 from collections.abc import Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, ClassVar
 
-__all__ = ["array_cells", "html_table", "math", "text_table"]
+__all__ = ["Summary", "array_cells", "field_cells", "html_table", "math", "text_table"]
+
+FEW = 6  # numbers that are listed one by one: a tensor in Mandel components
 
 
 def array_cells(name: str, unit: str, array: Any) -> tuple[str, str, str, str]:
@@ -69,3 +72,58 @@ def math(lines: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
     pairs = lines.items() if isinstance(lines, Mapping) else lines
     body = " \\\\\n".join(rf"\text{{{word}}} & {formula}" for word, formula in pairs)
     return "$$\\begin{array}{ll}\n" + body + "\n\\end{array}$$"
+
+
+class Summary:
+    """Mixin of a dataclass that holds results: it prints as a table of its fields, and is one in a notebook.
+
+    Arrays are shown by shape, unit and range, mappings by their names, sequences by their length; None is left out. Declare such a class
+    with `@dataclass(repr=False)`; `UNITS` names the units of its fields, `_title` says in a line what the object is.
+    """
+
+    UNITS: ClassVar[Mapping[str, str]] = {}
+    HEADS: ClassVar[tuple[str, ...]] = ("", "unit", "shape", "value")
+
+    def _title(self) -> str:
+        return type(self).__name__
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        found = [(f.name, getattr(self, f.name)) for f in dataclasses.fields(self)]  # type: ignore[arg-type]
+        return [field_cells(name, self.UNITS.get(name, ""), value) for name, value in found if value is not None]
+
+    def __repr__(self) -> str:
+        return text_table(self._title(), self._rows())
+
+    def _repr_html_(self) -> str:
+        return html_table(self._title(), self.HEADS, self._rows())
+
+
+def field_cells(name: str, unit: str, value: Any) -> tuple[str, str, str, str]:
+    """Name, unit, shape and value of anything that a result holds.
+
+    >>> field_cells("pressure", "Pa", 2e4), field_cells("quality", "", {"drift": 1e-9, "angle": 2.0})
+    (('pressure', 'Pa', '', '20000'), ('quality', '', '2 entries', 'drift, angle'))
+    """
+    if isinstance(value, bool) or value is None:
+        return name, unit, "", str(value).lower()
+    if isinstance(value, (int, float)):
+        return name, unit, "", f"{value:.6g}" if isinstance(value, float) else str(value)
+    if isinstance(value, Mapping):
+        return name, unit, _entries(len(value)), _shortened(", ".join(map(str, value)))
+    if isinstance(value, (tuple, list)) and not all(isinstance(x, (int, float)) for x in value):
+        kinds = list(dict.fromkeys(x if isinstance(x, str) else type(x).__name__ for x in value))
+        return name, unit, _entries(len(value)), _shortened(", ".join(kinds))
+    if hasattr(value, "dtype") or isinstance(value, (tuple, list)):
+        cells = array_cells(name, unit, value)
+        few = getattr(value, "ndim", 1) == 1 and 0 < len(value) <= FEW
+        return (*cells[:3], ", ".join(f"{float(x):.6g}" for x in value)) if few else cells
+    title = getattr(value, "_title", None)
+    return name, unit, "", _shortened(title() if callable(title) else str(value).splitlines()[0])
+
+
+def _entries(count: int) -> str:
+    return f"{count} {'entry' if count == 1 else 'entries'}"
+
+
+def _shortened(text: str, length: int = 70) -> str:
+    return text if len(text) <= length else text[: length - 1].rsplit(" ", 1)[0] + " …"

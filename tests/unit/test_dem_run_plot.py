@@ -78,7 +78,7 @@ def test_a_run_reads_as_what_it_is(run: Run) -> None:
 def test_the_curves_of_a_test_are_those_of_the_file(run: Run, signs: str) -> None:
     panels = axes_by_label(run.plot(signs=signs))
     sign = 1.0 if signs == "tension-positive" else -1.0
-    axial = rf"axial strain $\varepsilon_{{zz}}$ [%] ({'extension' if sign > 0 else 'shortening'} +)"
+    axial = rf"axial strain $\varepsilon_{{zz}}$ [%] ({'extension' if sign > 0 else 'compression'} +)"
     stress = r"equivalent stress $\sqrt{J_2}$ [kPa]"
     stored = run.content["record"]
     lateral, vertical = stored["wall_stress"][:, :2], stored["wall_stress"][:, 2]
@@ -91,7 +91,7 @@ def test_the_curves_of_a_test_are_those_of_the_file(run: Run, signs: str) -> Non
     x, y = curve(panels[r"mean pressure $p=-\mathrm{tr}\,\sigma/3$ [kPa]", stress])
     np.testing.assert_allclose(1e3 * x, -(lateral.sum(axis=1) + vertical) / 3.0, rtol=1e-12)
     word = "dilation" if sign > 0 else "contraction"
-    x, y = curve(panels[axial, rf"volume strain $\varepsilon_v$ [%] ({word} +)"])
+    x, y = curve(panels[axial, rf"volume strain $\varepsilon_{{v}}$ [%] ({word} +)"])
     np.testing.assert_allclose(y, sign * 100.0 * stored["wall_strain"][:, :3].sum(axis=1), rtol=1e-12)
     phases = panels["axial strain walked [%]", r"$\sqrt{J_2}$ of a phase [kPa]"]
     assert [line.get_label() for line in phases.lines] == ["grains", "beads", "wires"]

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
+import dataclasses
 from html.parser import HTMLParser
 from types import SimpleNamespace
+from typing import ClassVar
 
 import numpy as np
 import pytest
+from figure_words import assert_words_apart
 
+from fenchel.dem import PhaseHistory
+from fenchel.drawing import shown
 from fenchel.errors import Status
 from fenchel.front import Front, Measured
+from fenchel.identify import Estimate
+from fenchel.identify.estimate_view import estimate_figure, estimate_rows
 from fenchel.integrators import StepResult
 from fenchel.integrators.comparison import Comparison, Run
 from fenchel.integrators.history import History
+from fenchel.notebook import Summary
 from fenchel.potentials import total_conjugate
 from fenchel.potentials.library import LAWS
 
@@ -136,3 +144,102 @@ def test_a_front_marks_what_is_not_dominated():
     rows = Cells(front._repr_html_()).rows
     assert [r[0] for r in rows[1:]] == ["*", "", ""] and rows[3][-1] == "failed"
     assert "sand &amp; wires" in front._repr_html_()
+
+
+def summaries():
+    """Every class that is shown by its fields."""
+    import fenchel.dem.export.runs
+    import fenchel.identify
+    import fenchel.integrators.sensitivity_path  # noqa: F401
+
+    def below(kind):
+        return [kind, *(c for sub in kind.__subclasses__() for c in below(sub))]
+
+    return sorted((c for c in below(Summary)[1:]), key=lambda c: c.__name__)
+
+
+def test_every_unit_belongs_to_a_field():
+    found = summaries()
+    assert len(found) > 12
+    for kind in found:
+        names = {f.name for f in dataclasses.fields(kind)}
+        assert set(kind.UNITS) <= names, kind
+        assert kind.__repr__ is Summary.__repr__, f"{kind.__name__}: declare it with repr=False"
+
+
+def test_a_record_is_shown_by_its_fields():
+    count = 7
+    grown = np.arange(float(count))
+    tensors = {
+        name: np.outer(grown, np.ones(6)) * 1e4
+        for name in ("wall_stress", "stress_grains", "stress_beads", "stress_links")
+    }
+    strains = {name: np.zeros((count, 6)) for name in ("wall_strain", "strain_sand", "strain_wire")}
+    found = PhaseHistory(
+        pressure=2e4, linked=True, leg=np.zeros(count, dtype=int), axial_strain=-grown, **tensors, **strains
+    )
+    text = repr(found)
+    assert text.splitlines()[0] == "a test at 20 kPa by phase, 7 frames"
+    row = next(line for line in text.splitlines() if "wall_stress" in line)
+    assert row.split() == ["wall_stress", "Pa", "7", "×", "6", "0", "…", "60000"]
+    rows = Cells(found._repr_html_()).rows
+    assert (
+        rows[0] == ["", "unit", "shape", "value"]
+        and ["pressure", "Pa", "", "20000"] in rows
+        and ["linked", "", "", "true"] in rows
+    )
+
+
+def test_a_tensor_is_listed_and_what_is_missing_is_left_out():
+    @dataclasses.dataclass(repr=False)
+    class Thing(Summary):
+        stress: np.ndarray
+        words: tuple[str, ...] = ("one", "two")
+        none: float | None = None
+        parts: dict[str, float] = dataclasses.field(default_factory=lambda: {"a<b": 1.0})
+        inner: object = None
+
+        UNITS: ClassVar = {"stress": "Pa"}
+
+    found = Thing(np.array([1.0, -2.5, 0.0, 0.0, 0.0, 3e6]), inner=Thing(np.zeros(2)))
+    rows = Cells(found._repr_html_()).rows
+    assert ["stress", "Pa", "6", "1, -2.5, 0, 0, 0, 3e+06"] in rows
+    assert ["words", "", "2 entries", "one, two"] in rows and ["parts", "", "1 entry", "a<b"] in rows
+    assert ["inner", "", "", "Thing"] in rows and all(row[0] != "none" for row in rows)
+
+
+def test_a_step_says_what_it_is():
+    for solver, text in (("auto", "solver 'closed' ("), ("general", "solver 'general' (asked for by name)")):
+        step_of = LAWS["von_mises"].compile("3d", solver=solver)
+        assert repr(step_of).startswith("step of 'von_mises', 3d, driven by the strain, ") and text in repr(step_of)
+        assert len(repr(step_of)) < 300
+
+
+def test_estimates_are_a_table_and_a_figure():
+    told = {
+        "E_s": Estimate(name="E_s", unit="Pa", value=1.2e7, low=1.0e7, high=1.4e7, source="seeds", seed_values=(1.1e7, 1.3e7),
+                        seed_deviation=1e6, octant_deviation=1e6),
+        "C_0": Estimate(name="C_0", unit="Pa", value=0.0, low=-1.0, high=1.0, source="seeds", seed_values=(0.0,),
+                        seed_deviation=1.0, octant_deviation=1.0),
+        "H_k": Estimate(name="H_k", unit="Pa", value=-1e5, low=-9e5, high=7e5, source="octants", seed_values=(-1e5,),
+                        seed_deviation=np.nan, octant_deviation=1e5),
+        "nu": Estimate(name="nu", unit="1", value=0.2, low=np.nan, high=np.nan, source="none", seed_values=(0.2,),
+                       seed_deviation=np.nan, octant_deviation=np.nan),
+    }  # fmt: skip
+    assert estimate_rows(told) == [
+        ("E_s", "Pa", "1.2e+07", "1e+07 … 1.4e+07"),
+        ("C_0", "Pa", "0", "-1 … 1"),
+        ("H_k", "Pa", "-100000", "-9e+05 … 7e+05"),
+        ("nu", "1", "0.2", "none"),
+    ]
+    figure = estimate_figure(told)
+    axis = figure.axes[0]
+    bars = {line.get_ydata()[0]: line.get_xdata() for line in axis.get_lines() if line.get_linewidth() == 2.0}
+    np.testing.assert_allclose(bars[0], [1.0 / 1.2, 1.4 / 1.2], rtol=1e-12)
+    low, high = axis.get_xlim()
+    np.testing.assert_allclose(bars[2], [low, high], rtol=1e-12)  # −7 to 9 times the value: cut, with arrows
+    assert sorted(bars) == [0, 2]
+    assert {line.get_marker() for line in axis.get_lines() if line.get_ydata()[0] == 2} >= {"<", ">"}
+    shown(figure)
+    said = assert_words_apart(figure, 8)
+    assert any("no interval" in word for word in said) and any("-1e+05 Pa" in word for word in said)

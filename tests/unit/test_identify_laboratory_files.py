@@ -179,7 +179,7 @@ def test_from_files_to_a_law_that_drives(lab, capsys):
     assert [t["held_out"] for t in numbers["tests"]] == [False, False, True]
     assert numbers["tests"][2]["error_pore_pressure"] < 0.02
     page = (lab / "out" / "report.html").read_text()
-    assert page.count("data:image/svg+xml") == 2 and "http" not in page.replace("http-equiv", "")
+    assert page.count("data:image/svg+xml") == 3 and "http" not in page.replace("http-equiv", "")
     assert "&lt;b&gt;CU" in page and "<b>CU" not in page
     for name in ("C_0", "E_s", "H_eff", "not told apart", "Held out", "compression-positive"):
         assert name in page

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from fenchel.dem.laws import ElasticRod
+from fenchel.drawing import picture
 from fenchel.errors import ConvergenceError
-from fenchel.identify.figure_style import picture
 from fenchel.study import contact_onestep, contact_operator, wire_graphs
 from fenchel.study.contact_claims import CONTACT
 from fenchel.study.contact_truth import ConeStep, cone_fixed_point, lemke, natural_map

@@ -78,7 +78,7 @@ def test_every_claim_of_the_crushing_test_is_judged(cylinder):
 
 
 def test_pictures_can_be_drawn_from_what_is_there(cyclic, cylinder):
-    from fenchel.identify.figure_style import picture
+    from fenchel.drawing import picture
 
     for part, (folder, results), count in ((CYCLIC, cyclic, 3), (CRUSHING, cylinder, 5)):
         pictures = part.pictures(SIZE, folder, results)

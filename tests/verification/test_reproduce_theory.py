@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from fenchel.drawing import picture
 from fenchel.errors import ConvergenceError
-from fenchel.identify.figure_style import picture
 from fenchel.potentials.library import ENTRIES, LAWS
 from fenchel.study import formulation_energies, formulation_splits, model_sand, model_step, model_wires
 from fenchel.study.formulations import FORMULATIONS

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
+from .figures import figure_kind, write_figure
 from .laws import LAW, Formulation
 from .signs import SIGNS, Signs, turn_columns, turn_path
 from .values import PARAMETERS, VALUES, parameter_values
@@ -49,6 +50,12 @@ def _drive(
     output: Path | None = typer.Option(
         None, "-o", "--output", metavar="OUT.csv", help="Write the history; else a table."
     ),
+    plot: Path | None = typer.Option(
+        None,
+        "--plot",
+        metavar="FILE.png|svg",
+        help="Draw stress and strain, the path of the stress, volume and energies.",
+    ),
     signs: Signs = SIGNS,
     certify: bool = typer.Option(False, "--certify", help="Add the duality gap of every step [J/m3]."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the history as JSON."),
@@ -56,6 +63,8 @@ def _drive(
     """A material point along a path of prescribed strains and stresses; a component without column has zero stress.
 
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
+
+    Example: fenchel drive sand path.csv --parameters sand.toml --signs compression-positive --plot path.png
     """
     from fenchel.errors import InputError
     from fenchel.integrators import drive, read_path
@@ -64,6 +73,8 @@ def _drive(
 
     from .tables import csv_text, print_json, print_table
 
+    if plot is not None:
+        figure_kind(plot)
     values = parameter_values(pairs, parameters)
     plan = turn_path(read_path(path), signs)
     declared = load_law(law)
@@ -77,6 +88,8 @@ def _drive(
     if certify:
         columns["gap"] = _gaps(declared, history, values, plan.time, plan.temperature)
     columns = turn_columns(columns, signs)
+    if plot is not None:
+        write_figure(history.plot(signs=signs.value, title=declared.name), plot)
     if output is not None:
         write_text(output, csv_text(columns))
     if json_wanted:

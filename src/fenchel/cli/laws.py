@@ -8,11 +8,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
+from .figures import figure_kind, write_figure
 from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
-    from fenchel.potentials import Law
+    pass
 
 __all__ = ["LAW", "Formulation", "Split", "register"]
 
@@ -105,10 +106,14 @@ def _show(
         raise InputError("show prints either --latex or --json: leave one out")
     if plot is None and (pairs or parameters is not None):
         raise InputError("the table of a law has no values: give --plot FILE.png too, or leave -p and --parameters out")
+    if plot is not None:
+        figure_kind(plot)
     declared = load_law(law)
     table = declared.table(formulation.value, split=split.value)
     if plot is not None:
-        _draw(declared, plot, parameter_values(pairs, parameters), signs)
+        from fenchel.potentials.law_figure import law_figure
+
+        write_figure(law_figure(declared, parameter_values(pairs, parameters), signs=signs.value), plot)
     if json_wanted:
         content = table.json()
         if isinstance(content, str):
@@ -117,19 +122,6 @@ def _show(
             print_json(content)
     else:
         typer.echo(table.latex() if latex else table.text())
-
-
-def _draw(law: Law, file: Path, values: dict[str, float], signs: Signs) -> None:
-    """Write the figure of a law, in one piece."""
-    from fenchel.cache import replace_file
-    from fenchel.errors import InputError
-    from fenchel.potentials.law_figure import law_figure, picture
-
-    kind = file.suffix.lower().removeprefix(".")
-    if kind not in ("png", "svg"):
-        raise InputError(f"--plot {file}: the figure is written as .png or .svg: write --plot {file.stem or 'law'}.png")
-    figure = law_figure(law, values, signs=signs.value)
-    replace_file(file.resolve(), picture(figure, kind))
 
 
 def _check(

@@ -11,14 +11,16 @@ the axis in mind,
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dem.record import PhaseHistory
 from ..errors import InputError
+from ..notebook import Summary
 
 __all__ = ["Curves", "axial", "by_pressure", "curves", "deviator", "lateral", "pressure", "thin"]
 
@@ -45,9 +47,19 @@ def pressure(tensor: Array) -> Array:
     return -tensor[..., :3].sum(axis=-1) / 3.0
 
 
-@dataclass(frozen=True, kw_only=True)
-class Curves:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Curves(Summary):
     """One test reduced to curves, shape (frame_count,) each; strains [-] from the start, stresses [Pa], tension positive."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "box_strain": "-",
+        "strain": "-",
+        "strain_wire": "-",
+        "sand": "Pa",
+        "wire": "Pa",
+        "total": "Pa",
+    }
 
     pressure: float  # confining pressure [Pa]
     leg: NDArray[np.int64]
@@ -57,6 +69,9 @@ class Curves:
     sand: Array  # (frame_count, 6) stress of the sand, whole, Mandel
     wire: Array  # (frame_count, 6) stress of the wires, whole, Mandel
     total: Array  # (frame_count, 6) their sum
+
+    def _title(self) -> str:
+        return f"curves of a test at {self.pressure / 1e3:g} kPa, {len(self.leg)} frames"
 
     @property
     def axial_strain(self) -> Array:

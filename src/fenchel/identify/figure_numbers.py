@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, WALKED, canvas, colours, legend_below, styled, walked
+from ..drawing import FAINT, INK, WALKED, canvas, colours, legend_below, styled, walked
 from .identification import Identification
 from .runs_info import Series
 

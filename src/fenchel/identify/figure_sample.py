@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, canvas, styled
+from ..drawing import FAINT, INK, canvas, styled
 from .runs_info import SampleView
 
 __all__ = ["sample_figure"]

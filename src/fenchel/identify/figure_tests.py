@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, WALKED, Signs, canvas, colours, legend_below, styled, walked
+from ..drawing import FAINT, INK, WALKED, Signs, canvas, colours, legend_below, styled, walked
 from .identification import Identification
 from .prediction import Prediction
 

@@ -10,8 +10,11 @@ from typing import Any
 import numpy as np
 
 from ..dem.record import PhaseHistory, TriaxialRecord
+from ..drawing import Signs, shown
 from ..errors import ConvergenceError, InputError
+from ..notebook import Summary
 from .curves import Curves, curves
+from .estimate_view import HEADS, estimate_figure, estimate_rows
 from .findings import findings
 from .fit import UNITS, LawFit, fit_law, scalars
 from .interval import Estimate, estimate
@@ -39,8 +42,8 @@ class Control:
     wire_stress_max: float  # largest component of the link stress in the control [Pa]: zero, or something is wrong
 
 
-@dataclass(frozen=True, kw_only=True)
-class Identification:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Identification(Summary):
     """What `identify_law` found; `law` is the exported set (joint fit over all samples and fitted pressures)."""
 
     options: IdentifyOptions
@@ -57,6 +60,32 @@ class Identification:
     findings: tuple[str, ...]  # one sentence each, the plainest first
     failed_replicas: int  # octant replicas whose fit did not converge (left out of the spread)
     seconds: float
+
+    HEADS = HEADS
+
+    def plot(self, *, signs: str = "tension-positive") -> Any:
+        """A matplotlib figure: every test and the law that was identified. `InputError` for other `signs` than "tension-positive" and
+        "compression-positive"."""
+        from .figure_tests import fit_figure
+
+        return shown(fit_figure(self, Signs(signs)))
+
+    def plot_yield(self) -> Any:
+        """A matplotlib figure: √J₂ of the sand against its mean pressure, yield points and the fitted lines."""
+        from .figure_numbers import yield_figure
+
+        return shown(yield_figure(self))
+
+    def plot_intervals(self) -> Any:
+        """A matplotlib figure: the values with the intervals in which another sample is expected, each over its value."""
+        return shown(estimate_figure(self.estimates))
+
+    def _title(self) -> str:
+        levels = ", ".join(f"{level / 1e3:g}" for level in self.fitted)
+        return f"a law identified from {len(self.seeds)} sample(s) at {levels} kPa"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return estimate_rows(self.estimates)
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers, strings, lists and dicts; arrays over frames are left out, nan becomes None."""

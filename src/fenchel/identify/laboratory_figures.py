@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .figure_style import FAINT, INK, Signs, canvas, colours, legend_below, styled
+from ..drawing import FAINT, INK, Signs, canvas, colours, legend_below, styled
 from .laboratory_fit import LaboratoryFit, LaboratoryReplay
 
 __all__ = ["curve_figure", "path_figure"]

@@ -16,12 +16,13 @@ import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import InputError
+from ..notebook import Summary
 
 __all__ = ["LaboratoryTest", "pressure_value", "read_laboratory"]
 
@@ -56,14 +57,22 @@ PRESSURES = {
 _HEAD = re.compile(r"^(?P<name>[^\[\]()]+?)\s*[\[(](?P<unit>[^\[\]()]*)[\])]$")
 
 
-@dataclass(frozen=True, kw_only=True)
-class LaboratoryTest:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LaboratoryTest(Summary):
     """One test. Arrays of shape (row_count,); strains [-] positive in tension and zero in the first row.
 
     `pressure` is the effective isotropic pressure [Pa] of the start, positive; `q` = σ_r − σ_a [Pa], positive in triaxial compression;
     `volume_strain` tr ε of a drained test, else None; `pore_pressure` [Pa] of an undrained test, as its change from the first row, else
     None. `notes` are the comment lines that say nothing fenchel reads.
     """
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "axial_strain": "-",
+        "q": "Pa",
+        "volume_strain": "-",
+        "pore_pressure": "Pa",
+    }
 
     name: str
     pressure: float
@@ -72,6 +81,9 @@ class LaboratoryTest:
     volume_strain: Array | None = None
     pore_pressure: Array | None = None
     notes: tuple[str, ...] = field(default=())
+
+    def _title(self) -> str:
+        return f"{self.name}: {len(self.q)} rows, {'drained' if self.drained else 'undrained'}"
 
     @property
     def drained(self) -> bool:

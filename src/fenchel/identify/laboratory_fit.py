@@ -15,7 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..drawing import Signs, shown
 from ..errors import InputError
+from ..notebook import Summary
+from .estimate_view import HEADS, estimate_figure, estimate_rows
 from .laboratory_file import LaboratoryTest
 from .laboratory_interval import LaboratoryEstimate, estimates_of, leave_one_out
 from .laboratory_problem import LaboratoryProblem, relative_scales
@@ -31,8 +34,8 @@ PART = 0.3  # of the largest weight in the weakest direction: parameters above i
 HELD_FIRST = ("H_i", "C_0", "c", "nu_s", "nu")
 
 
-@dataclass(frozen=True, kw_only=True)
-class LaboratoryReplay:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LaboratoryReplay(Summary):
     """One test and the law along it; errors are rms (law − data)/max|data|."""
 
     test: LaboratoryTest
@@ -41,9 +44,12 @@ class LaboratoryReplay:
     error_q: float
     error_second: float  # of the volume strain (drained) or the pore pressure (undrained)
 
+    def _title(self) -> str:
+        return f"{self.test.name} and the law" + (", held out" if self.held_out else "")
 
-@dataclass(frozen=True, kw_only=True)
-class LaboratoryFit:
+
+@dataclass(frozen=True, kw_only=True, repr=False)
+class LaboratoryFit(Summary):
     """A law with the `values` of its parameters [SI], their `estimates`, and every test replayed, the held-out ones last."""
 
     law: Any
@@ -56,6 +62,31 @@ class LaboratoryFit:
     misfit: float  # root mean square of the relative residuals
     confidence: float
     volume_weight: float
+
+    HEADS = HEADS
+
+    def plot(self, *, signs: str = "compression-positive") -> Any:
+        """A matplotlib figure: q, volume strain and pore pressure against the axial strain, measured and by the law. `InputError` for
+        other `signs` than "tension-positive" and "compression-positive"."""
+        from .laboratory_figures import curve_figure
+
+        return shown(curve_figure(self, Signs(signs)))
+
+    def plot_paths(self, *, signs: str = "compression-positive") -> Any:
+        """A matplotlib figure: q against the effective mean pressure, measured and by the law."""
+        from .laboratory_figures import path_figure
+
+        return shown(path_figure(self, Signs(signs)))
+
+    def plot_intervals(self) -> Any:
+        """A matplotlib figure: the fitted values with their intervals, each over its value."""
+        return shown(estimate_figure({name: self.estimates[name] for name in self.fitted}))
+
+    def _title(self) -> str:
+        return f"law '{self.law_name}' fitted to {sum(not replay.held_out for replay in self.replays)} test(s), misfit {self.misfit:.3g}"
+
+    def _rows(self) -> list[tuple[str, ...]]:
+        return estimate_rows(self.estimates)
 
 
 def fit_laboratory(

@@ -12,8 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from .. import __version__
+from ..drawing import Signs, picture
 from ..errors import StorageError
-from .figure_style import Signs, picture
+from .estimate_view import estimate_figure
 from .html import figure_html, page_html, table_html
 from .jsonable import jsonable
 from .laboratory_figures import curve_figure, path_figure
@@ -148,6 +149,11 @@ def _page(fit: LaboratoryFit, signs: Signs, files: list[str]) -> str:
         "Effective stress paths. q is √(3 J₂) in triaxial tests; the √J₂ of the law is q/√3.",
         picture(path_figure(fit, signs)),
     )
+    intervals = figure_html(
+        "intervals",
+        f"The fitted values with their intervals ({fit.confidence:.0%}), over themselves.",
+        picture(estimate_figure({name: fit.estimates[name] for name in fit.fitted})),
+    )
     listed = "".join(f"<li><code>{escape(name)}</code></li>" for name in files)
     parts = [
         f"<h1>{TITLE}</h1>",
@@ -156,6 +162,7 @@ def _page(fit: LaboratoryFit, signs: Signs, files: list[str]) -> str:
         f"<p>Law <code>{escape(fit.law_name)}</code>; stresses are effective. Run it: "
         f"<code>fenchel drive law.py:law {escape(path)}</code></p>",
         _values_table(fit),
+        intervals,
         f"<p>Condition number of the fitted columns: {number(fit.condition, 3)}. Weight of volume strain and pore pressure against q: "
         f"{fit.volume_weight:g}.</p>",
         "<h2>Tests and replay</h2>",

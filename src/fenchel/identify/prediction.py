@@ -7,11 +7,14 @@ a target: associated flow dilates with slope t from first yield, while grains co
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..notebook import Summary
 from .curves import Curves, deviator, lateral, pressure
 from .elastic import unit_wire
 from .parameters import LawParameters
@@ -22,9 +25,27 @@ __all__ = ["Prediction", "predict"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Prediction:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Prediction(Summary):
     """One test and its replay; arrays of shape (frame_count,), errors relative to the largest measured magnitude."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "axial_strain": "-",
+        "lateral_pressure": "Pa",
+        "q": "Pa",
+        "q_law": "Pa",
+        "q_sand": "Pa",
+        "mean_sand": "Pa",
+        "lateral_strain": "-",
+        "lateral_strain_law": "-",
+        "volume_strain": "-",
+        "volume_strain_law": "-",
+        "volume_end": "-",
+        "volume_end_law": "-",
+        "wire": "Pa",
+        "wire_law": "Pa",
+    }
 
     pressure: float
     seed: int
@@ -48,6 +69,11 @@ class Prediction:
     volume_strain_law: Array
     wire: Array  # lateral wire stress, less its start [Pa]
     wire_law: Array
+
+    def _title(self) -> str:
+        return f"law against grains at {self.pressure / 1e3:g} kPa, seed {self.seed}" + (
+            ", held out" if self.held_out else ""
+        )
 
 
 def _relative(law: Array, data: Array) -> float:

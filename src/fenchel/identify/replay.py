@@ -7,14 +7,16 @@ starts there at ε = 0 with the plastic strain ε^p = P/(3 K_s) I, α = 0, p = 0
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any, Protocol
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ConvergenceError, Status
+from ..notebook import Summary
 from .elastic import unit_wire
 from .parameters import LawParameters
 
@@ -23,13 +25,22 @@ __all__ = ["Replay", "Simulate", "replay"]
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Replay:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Replay(Summary):
     """Strain [-] and stress [Pa] of the law along a test, Mandel, shape (frame_count, 6); whole and of the wires."""
+
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "strain": "-",
+        "stress": "Pa",
+        "wire": "Pa",
+    }
 
     strain: Array
     stress: Array
     wire: Array
+
+    def _title(self) -> str:
+        return "the law along a test"
 
 
 class Simulate(Protocol):

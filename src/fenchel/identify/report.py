@@ -13,8 +13,8 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
+from ..drawing import Signs, picture
 from ..errors import StorageError
-from .figure_style import Signs, picture
 from .html import figure_html, page_html, table_html
 from .identification import Identification
 from .jsonable import jsonable
@@ -35,6 +35,7 @@ class _Figure:
 
 def figures(found: Identification, info: RunsInfo, signs: Signs) -> list[_Figure]:
     """The figures of the report in order, drawn when asked; those without data are left out."""
+    from .estimate_view import estimate_figure
     from .figure_numbers import energy_figure, residual_figure, yield_figure
     from .figure_sample import sample_figure
     from .figure_tests import fit_figure, mismatch_figure, phase_figure, strain_figure, stress_figure, wire_figure
@@ -44,6 +45,11 @@ def figures(found: Identification, info: RunsInfo, signs: Signs) -> list[_Figure
         view = info.sample
         out.append(_Figure("sample", "The sample.", lambda: sample_figure(view), "png"))
     out += [
+        _Figure(
+            "intervals",
+            "The identified values (dots) with the interval in which another sample is expected, over themselves; rings: single samples.",
+            lambda: estimate_figure(found.estimates),
+        ),
         _Figure(
             "stress",
             "Stress–strain curves, with wires and with the same beads unlinked.",
@@ -103,7 +109,7 @@ def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
         f"<h1>{escape(info.title)}</h1>",
         f'<ul class="findings">{sentences}</ul>{notes}',
         "<h2>The law</h2>",
-        put("values", "stages"),
+        put("values", "intervals", "stages"),
         f"<p>Run it: <code>fenchel drive law.py:law path_{first}.csv --parameters parameters_{first}.toml</code></p>",
         "<h2>Tests and replay</h2>",
         f"<p>Axes: {escape(signs.name)}; q is positive when the sample is pressed along z.</p>",

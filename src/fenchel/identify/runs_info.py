@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..dem.record import TriaxialRecord
+from ..notebook import Summary
 
 __all__ = ["RunsInfo", "SampleView", "Series", "quality_notes", "quality_rows", "series_of"]
 
@@ -29,19 +30,27 @@ class SampleView:
     title: str = ""
 
 
-@dataclass(frozen=True, kw_only=True)
-class Series:
+@dataclass(frozen=True, kw_only=True, repr=False)
+class Series(Summary):
     """Measures along one test, by name, shape (frame_count,); names as in `fenchel.dem.residual.MEASURES`.
 
     Drawn where present: natural_map, change, unbalanced (residuals); external, friction, algorithmic, shock, elastic, kinetic,
     balance (energies [J]; summed from the start, except elastic and kinetic).
     """
 
+    UNITS: ClassVar[Mapping[str, str]] = {
+        "pressure": "Pa",
+        "axial_strain": "-",
+    }
+
     seed: int
     pressure: float
     linked: bool
     axial_strain: Array
     values: Mapping[str, Array]
+
+    def _title(self) -> str:
+        return f"measures of the test at {self.pressure / 1e3:g} kPa, seed {self.seed}"
 
 
 @dataclass(frozen=True, kw_only=True)

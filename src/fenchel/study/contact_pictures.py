@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.figure_style import FAINT, INK, canvas, legend_below, styled
+from ..drawing import FAINT, INK, canvas, legend_below, styled
 
 __all__ = [
     "buckling_figure", "convergence_figure", "laws_figure", "limit_figure", "motion_figure", "residual_figure", "sweeps_figure",

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.figure_style import FAINT, INK, canvas, legend_below, styled
+from ..drawing import FAINT, INK, canvas, legend_below, styled
 from .models import MODELS
 
 __all__ = ["SHADES", "line_figure", "loop_figure", "sweep_figure"]

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..dem.bodies import Assembly
 from ..dem.measures import Network, Repose, active_length
-from ..identify.figure_style import FAINT, canvas, colours, styled
+from ..drawing import FAINT, canvas, colours, styled
 from .active_segments import MULTIPLES, Segments
 
 __all__ = ["box_view", "fabric_history", "heap_view", "length_figure", "profile_figure"]

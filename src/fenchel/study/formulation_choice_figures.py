@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..identify.figure_style import INK, canvas, colours, styled
+from ..drawing import INK, canvas, colours, styled
 from .cost_functions import COSTS, NAMES
 
 __all__ = ["grains_figure", "planted_figure"]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.figure_style import FAINT, INK, canvas, styled
+from ..drawing import FAINT, INK, canvas, styled
 from .statistics import Mean
 
 __all__ = ["bead_figure", "macro_figure", "wire_stress_figure"]

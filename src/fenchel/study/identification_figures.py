@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..identify.figure_style import FAINT, canvas, styled, walked
+from ..drawing import FAINT, canvas, styled, walked
 from ..identify.yielding import least_absolute_line, least_squares_line
 from .sizes import Size
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..identify.figure_style import canvas, colours, legend_below, styled
+from ..drawing import canvas, colours, legend_below, styled
 from .model_sand import ANGLES, COHESION, PRESSURE, READINGS, hexagon_radius
 
 __all__ = ["cone_figure", "gap_figure"]

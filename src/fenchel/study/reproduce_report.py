@@ -9,7 +9,7 @@ from typing import Any
 
 from .. import __version__
 from ..dem.storage import replace_file
-from ..identify.figure_style import picture
+from ..drawing import picture
 from ..identify.html import figure_html, page_html, table_html
 from .claim import Claim, Part, Picture, Verdict
 from .headline import Headline

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from ..drawing import FAINT, canvas, picture, styled
 from ..front import ROUNDING, Front
-from ..identify.figure_style import FAINT, canvas, picture, styled
 
 __all__ = ["draw_fronts", "front_picture"]
 

@@ -1,25 +1,63 @@
-"""How the figures of the report look: restrained, readable on a phone, tension or compression positive."""
+"""How every figure looks: restrained, readable on a phone, tension or compression positive (the ground floor: nothing of ours but errors).
+
+The colours are those of Okabe and Ito (2008), told apart by readers of every kind of colour vision; where curves of one panel must be told
+apart they differ in their dashes or markers too.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import wraps
+from functools import partial, wraps
 from io import BytesIO
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import InputError
+from .errors import InputError
 
-__all__ = ["SIGNS", "WALKED", "Signs", "canvas", "colours", "legend_below", "picture", "styled", "walked"]
+__all__ = [
+    "BLUE",
+    "FAINT",
+    "GREEN",
+    "INK",
+    "LOOKS",
+    "MEASURES",
+    "ORANGE",
+    "PURPLE",
+    "SIGNS",
+    "SKY",
+    "STYLE",
+    "VERMILION",
+    "WALKED",
+    "Signs",
+    "canvas",
+    "colours",
+    "legend_below",
+    "picture",
+    "shown",
+    "styled",
+    "unit_scale",
+    "walked",
+]
 
 Array = NDArray[np.float64]
 SIGNS = ("tension-positive", "compression-positive")
 INK, FAINT = "#222222", "#8a8a8a"
-_PALETTE = ("#1b6ca8", "#d1783c", "#3b8f5a", "#8c4fa3", "#b03a48", "#6b6b2a")
-_STYLE: dict[Any, Any] = {
+BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00"
+_PALETTE = (BLUE, VERMILION, GREEN, PURPLE, SKY, ORANGE)
+# of curves in one panel: colour and dashes
+LOOKS: tuple[dict[str, Any], ...] = (
+    {"color": BLUE, "linestyle": "-"},
+    {"color": VERMILION, "linestyle": "--"},
+    {"color": GREEN, "linestyle": "-."},
+    {"color": PURPLE, "linestyle": ":"},
+    {"color": INK, "linestyle": (0, (6, 1, 1, 1, 1, 1))},
+)
+# equivalent stresses: the factor on √J₂, and the label
+MEASURES = {"sqrt_J2": (1.0, r"$\sqrt{J_2}$"), "q": (3.0**0.5, r"$q=\sqrt{3J_2}$")}
+STYLE: dict[Any, Any] = {
     "font.size": 9.0,
     "font.family": "sans-serif",
     "font.sans-serif": ["DejaVu Sans"],
@@ -114,13 +152,13 @@ def canvas(rows: int, columns: int, *, height: float = 2.7, **options: Any) -> t
 
 
 def styled(draw: Callable[..., Any]) -> Callable[..., Any]:
-    """A drawing function under the style of the report (matplotlib reads part of it when text is set)."""
+    """A drawing function under this style (matplotlib reads part of it when text is set)."""
 
     @wraps(draw)
     def run(*arguments: Any, **options: Any) -> Any:
         import matplotlib
 
-        with matplotlib.rc_context(_STYLE):
+        with matplotlib.rc_context(STYLE):
             return draw(*arguments, **options)
 
     return run
@@ -137,6 +175,28 @@ def picture(figure: Any, kind: str = "svg") -> bytes:
 
     buffer = BytesIO()
     metadata = {"Date": None} if kind == "svg" else {"Software": None}
-    with matplotlib.rc_context(_STYLE):
+    with matplotlib.rc_context(STYLE):
         figure.savefig(buffer, format=kind, metadata=metadata, dpi=160)
     return buffer.getvalue()
+
+
+def shown(figure: Any) -> Any:
+    """The figure, which a notebook now shows by itself, without pyplot."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    if not isinstance(figure.canvas, FigureCanvasAgg):
+        FigureCanvasAgg(figure)
+    figure._repr_png_ = partial(picture, figure, "png")
+    return figure
+
+
+def unit_scale(size: float, unit: str = "Pa") -> tuple[float, str]:
+    """Factor to the multiple of a unit in which a number of this size reads best, and its name; the unit itself below a billionth of it.
+
+    >>> unit_scale(2.5e6), unit_scale(0.02, "m"), unit_scale(0.0, "N")
+    ((1e-06, 'MPa'), (1000.0, 'mm'), (1.0, 'N'))
+    """
+    for factor, prefix in ((1e-9, "G"), (1e-6, "M"), (1e-3, "k"), (1.0, ""), (1e3, "m"), (1e6, "µ"), (1e9, "n")):
+        if size * factor >= 1.0:
+            return factor, prefix + unit
+    return 1.0, unit
