@@ -41,7 +41,7 @@ lint: $(PROJECT) $(VENV)/.test $(VENV)/.lint
 	  | $(BIN)/python .ci/public_types.py
 
 docs: $(PROJECT) $(VENV)/.docs
-	$(BIN)/python -m sphinx -W --keep-going -q -b html docs docs/_build/html
+	$(BIN)/python -m sphinx -j auto -W --keep-going -q -b html docs docs/_build/html
 	@echo "The pages are $(abspath docs/_build/html)/index.html"
 
 bench: $(PROJECT) $(VENV)/.test

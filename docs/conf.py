@@ -1,6 +1,7 @@
 """Sphinx configuration. `make docs` builds with every warning an error and runs every example on the pages."""
 
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 import fenchel
@@ -29,6 +30,10 @@ extensions = [
 exclude_patterns = ["_build", "_generate", "**.ipynb_checkpoints"]
 suppress_warnings = ["config.cache"]
 
+# the pages show their formulas without a network: MathJax is copied beside them (its package as an extension would forbid parallel builds)
+html_static_path = [str(Path(str(find_spec("sphinx-mathjax-offline").origin)).parent / "static")]
+mathjax_path = "mathjax/tex-chtml.js"
+
 html_theme = "furo"
 html_title = f"fenchel {release}"
 
@@ -37,6 +42,7 @@ nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 120
 nb_merge_streams = True
+nb_render_markdown_format = "myst"  # formulas in what a cell returns
 
 bibtex_bibfiles = ["references.bib"]
 bibtex_default_style = "unsrt"

@@ -17,6 +17,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from ..drawing import Signs
 from ..errors import InputError, StorageError
 from ..notebook import Summary
 from .history import History
@@ -49,8 +50,13 @@ class StrainStressPath(Summary):
         return f"a path of {len(self.time)} rows"
 
 
-def read_path(file: str | Path) -> StrainStressPath:
-    """Read `PATH.csv`. `InputError` names the file, the row (header is row 1) and the column."""
+def read_path(file: str | Path, *, signs: str = "tension-positive") -> StrainStressPath:
+    """Read `PATH.csv`, whose strains and stresses are written under `signs`; what is returned is tension positive.
+
+    With "compression-positive" every tensor component and `eps_v` turn; the mean pressure `p` is positive in compression under either.
+    `InputError` names the file, the row (header is row 1) and the column.
+    """
+    factor = Signs(signs).factor
     path = Path(file)
     try:
         rows = list(csv.reader(path.read_text(encoding="utf-8-sig").splitlines()))
@@ -84,13 +90,15 @@ def read_path(file: str | Path) -> StrainStressPath:
         raise InputError(
             f"path file '{path}', row {rows[2 + late[0]][0]}, column 't': the time must increase, it is {time[late[0] + 1]:g}"
         )
-    return _path(header, table, time)
+    return _path(header, table, time, factor)
 
 
 def _check_header(path: Path, header: list[str]) -> None:
     where = f"path file '{path}', row 1"
     for name in header:
         if name not in _KNOWN:
+            if ";" in name or "\t" in name:
+                raise InputError(f"{where}: the cells must be separated by commas, with points in the numbers")
             raise InputError(f"{where}: unknown column '{name}'; a path has: {', '.join(_KNOWN)}")
         if header.count(name) > 1:
             raise InputError(f"{where}: the column '{name}' stands twice")
@@ -98,7 +106,10 @@ def _check_header(path: Path, header: list[str]) -> None:
         raise InputError(f"{where}: the column 't' is missing")
     for c in COMPONENTS:
         if f"eps_{c}" in header and f"sig_{c}" in header:
-            raise InputError(f"{where}: both 'eps_{c}' and 'sig_{c}' are given; prescribe one of them")
+            raise InputError(
+                f"{where}: both 'eps_{c}' and 'sig_{c}' are given; prescribe one of them, the same for the whole path "
+                "(drive_arrays goes on from a state under another control)"
+            )
     if "eps_v" in header and "p" in header:
         raise InputError(f"{where}: both 'eps_v' and 'p' are given; one of them may replace one component")
     for name in ("eps_v", "p"):
@@ -110,7 +121,8 @@ def _check_header(path: Path, header: list[str]) -> None:
 
 def _numbers(path: Path, number: int, header: list[str], row: list[str]) -> list[float]:
     if len(row) != len(header):
-        raise InputError(f"path file '{path}', row {number}: {len(row)} cells under {len(header)} columns")
+        commas = "; numbers have points, not commas" if len(row) > len(header) else ""
+        raise InputError(f"path file '{path}', row {number}: {len(row)} cells under {len(header)} columns{commas}")
     found = []
     for name, cell in zip(header, row, strict=True):
         try:
@@ -125,27 +137,28 @@ def _numbers(path: Path, number: int, header: list[str], row: list[str]) -> list
     return found
 
 
-def _path(header: list[str], table: np.ndarray, time: np.ndarray) -> StrainStressPath:
+def _path(header: list[str], table: np.ndarray, time: np.ndarray, factor: float) -> StrainStressPath:
     control, targets = np.ones(6, dtype=bool), np.zeros((len(time), 6))
     trace = next((name for name in ("eps_v", "p") if name in header), None)
     for i, c in enumerate(COMPONENTS):
         for kind in ("eps", "sig"):
             if f"{kind}_{c}" in header:
                 control[i] = kind == "sig"
-                targets[:, i] = table[:, header.index(f"{kind}_{c}")] * MANDEL[i]
+                targets[:, i] = factor * MANDEL[i] * table[:, header.index(f"{kind}_{c}")] + 0.0
         if trace is not None and i < 3 and f"eps_{c}" not in header and f"sig_{c}" not in header:
             targets[:, i] = np.nan
-    condition = None if trace is None else table[:, header.index(trace)]
+    condition = None if trace is None else table[:, header.index(trace)] * (factor if trace == "eps_v" else 1.0) + 0.0
     heat = table[:, header.index("T")].copy() if "T" in header else None
     return StrainStressPath(time, control, targets, trace, condition, heat)
 
 
-def write_history(file: str | Path, history: History, time: Any = None) -> None:
+def write_history(file: str | Path, history: History, time: Any = None, *, signs: str = "tension-positive") -> None:
     """Write `OUT.csv`: t, (T,) eps_*, sig_*, eps_v, p, q, internal variables, (entropy,) psi, dissipation, status.
 
-    `p` is the mean pressure −tr σ/3 and `q` = √(3 J₂). A scalar internal variable whose name is taken is written as `internal_<name>`.
+    `p` is the mean pressure −tr σ/3 and `q` = √(3 J₂), under either of the `signs`: "compression-positive" turns tensor components and
+    `eps_v`. A scalar internal variable whose name is taken is written as `internal_<name>`.
     """
-    columns = history_columns(history, time)
+    columns = history_columns(history, time, signs)
     lines = [",".join(columns)]
     for row in zip(*columns.values(), strict=True):
         lines.append(",".join(repr(float(v)) if not isinstance(v, (int, np.integer)) else str(int(v)) for v in row))
@@ -155,8 +168,9 @@ def write_history(file: str | Path, history: History, time: Any = None) -> None:
         raise StorageError(f"cannot write '{file}': {error.strerror}") from None
 
 
-def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]:
-    """Columns of `OUT.csv` by name."""
+def history_columns(history: History, time: Any = None, signs: str = "tension-positive") -> dict[str, np.ndarray]:
+    """Columns of `OUT.csv` by name, under `signs`."""
+    factor = Signs(signs).factor
     n = len(history.psi)
     columns: dict[str, np.ndarray] = {"t": np.arange(n, dtype=float) if time is None else np.asarray(time, dtype=float)}
     if history.temperature is not None:
@@ -179,4 +193,8 @@ def history_columns(history: History, time: Any = None) -> dict[str, np.ndarray]
             columns |= {f"{name}_{c}": values[:, i] / MANDEL[i] for i, c in enumerate(COMPONENTS)}
         else:
             columns[f"internal_{name}" if name in columns or name in ends else name] = values
-    return columns | ends
+    found = columns | ends
+    if factor > 0.0:
+        return found
+    turning = tuple(f"_{c}" for c in COMPONENTS)
+    return {name: 0.0 - v if name.endswith(turning) or name == "eps_v" else v for name, v in found.items()}

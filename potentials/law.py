@@ -180,11 +180,14 @@ class Law:
         for name in given:
             if name not in known:
                 raise InputError(f"law '{self.name}' has no parameter '{name}'; it has: {', '.join(known) or 'none'}")
+        missing = [p for name, p in known.items() if given.get(name, p.default) is None]
+        if missing:
+            listed = ", ".join(f"'{p.name}'" + (f" [{p.unit}]" if p.unit else "") for p in missing)
+            word, verb = ("parameter", "has") if len(missing) == 1 else ("parameters", "have")
+            raise InputError(f"law '{self.name}': {word} {listed} {verb} no value; give {missing[0].name}=...")
         found: dict[str, float] = {}
         for name, symbol in known.items():
             value = given.get(name, symbol.default)
-            if value is None:
-                raise InputError(f"law '{self.name}': parameter '{name}' has no value; give {name}=...")
             try:
                 number = float(value)
             except (TypeError, ValueError):
@@ -194,9 +197,9 @@ class Law:
             if not math.isfinite(number):
                 raise InputError(f"law '{self.name}': parameter '{name}' is {number}; it must be finite")
             if not symbol.lower <= number <= symbol.upper:
-                hint = "; softening is not modelled" if number < 0 and symbol.note.startswith("hardening") else ""
                 raise InputError(
-                    f"law '{self.name}': parameter '{name}' = {number:g} lies outside [{symbol.lower:g}, {symbol.upper:g}]{hint}"
+                    f"law '{self.name}': parameter '{name}' = {number:g} lies outside [{symbol.lower:g}, {symbol.upper:g}]"
+                    f"{_hint(symbol, number)}"
                 )
             found[name] = number
         return found
@@ -353,6 +356,16 @@ class Law:
                     f"law '{self.name}': the internal variable '{variable}' cannot evolve, because phi_star does not mention its force; "
                     f"add forces({variable}) to phi_star or take the variable out"
                 )
+
+
+def _hint(symbol: Any, number: float) -> str:
+    """What a value out of bounds probably meant."""
+    unit = "" if symbol.unit in ("", "1") else f" {symbol.unit}"
+    if number < 0 and symbol.note.startswith("hardening"):
+        return f"{unit}; softening is not modelled"
+    if symbol.unit == "rad" and symbol.lower <= math.radians(number) <= symbol.upper:
+        return f" rad; if it is in degrees, {number:g}° = {math.radians(number):.6g} rad"
+    return unit
 
 
 def _declared(law: Law) -> list[tuple[str, str]]:

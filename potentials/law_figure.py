@@ -78,7 +78,7 @@ def _panels(
             handles, labels = axes[0, 0].get_legend_handles_labels()
             figure.legend(handles, labels, loc="outside upper right", ncols=2 if len(labels) > 3 else len(labels))
         notes = drawing.notes + notes
-    notes = [_values_line(values), *notes] if values else notes
+    notes = [_values_line(law, values), *notes] if values else notes
     figure.suptitle(law.name, fontsize=10.0, fontweight="bold", x=0.01, ha="left")
     figure.supxlabel("\n".join(_wrapped(notes)), fontsize=8.0, x=0.01, ha="left", color=INK)
     return shown(figure)
@@ -258,8 +258,11 @@ def _remarks(found: Drawing, domain: Domain) -> None:
         found.notes.append("The path is projected on either plane; the surfaces are those at its end.")
 
 
-def _values_line(values: Mapping[str, Any]) -> str:
-    return ", ".join(f"{name}\u00a0=\u00a0{float(value):.4g}" for name, value in values.items())
+def _values_line(law: Law, values: Mapping[str, Any]) -> str:
+    units = {p.name: "" if p.unit in ("", "1") else f"\u00a0{p.unit}" for p in law.parameters}
+    if law.temperature is not None:
+        units[law.temperature.name] = "\u00a0K"
+    return ", ".join(f"{name}\u00a0=\u00a0{float(value):.4g}{units.get(name, '')}" for name, value in values.items())
 
 
 def _wrapped(notes: list[str]) -> list[str]:

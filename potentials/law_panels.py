@@ -210,7 +210,9 @@ def energy_panels(axes: Any, pair: EnergyPair, direction: Any, factor: float) ->
         "The tangents there (dashed) cut the ordinates at −ψ* and −ψ.",
     ]
     if rest != 0.0:
-        notes.append(f"ψ is drawn less its value without strain, {engineered(rest, 'J/m³')}, and ψ* more it.")
+        notes.append(
+            f"Both are shifted to be zero without strain: from ψ is taken {engineered(rest, 'J/m³')}, stored by hardening; ψ* has it more."
+        )
     if pair.how == "closed form":
         notes.append(f"ψ* is its closed form; |ψ + ψ* − σ:ε| ≤ {engineered(pair.residual, 'J/m³')} on the curve.")
     elif pair.how == "numerical":

@@ -6,6 +6,7 @@ A law file is Python and is run as such, with the rights of the user; do not run
 from __future__ import annotations
 
 import runpy
+from difflib import get_close_matches
 from pathlib import Path
 
 from ..errors import FenchelError, InputError
@@ -23,8 +24,14 @@ def load_law(where: str) -> Law:
         return LAWS[text]
     place, colon, name = text.rpartition(":")
     if not colon or not place or not name:
+        if text.endswith(".py") and Path(text).is_file():
+            raise InputError(f"{text!r} is a file: write {text}:NAME, with the name that the law has in it")
+        near = get_close_matches(text.lower().replace("-", "_"), LAWS, n=1, cutoff=0.7)
+        meant = f"do you mean {near[0]!r}? " if near else ""
         raise InputError(
-            f"no law is called {text!r}; the library has: {', '.join(LAWS)}; a law file is given as file.py:name"
+            f"no law is called {text!r}; {meant}The library has: {', '.join(LAWS)}; a law file is given as file.py:name"
+            if near
+            else f"no law is called {text!r}; the library has: {', '.join(LAWS)}; a law file is given as file.py:name"
         )
     path = Path(place)
     if not path.is_file():

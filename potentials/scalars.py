@@ -164,11 +164,15 @@ def parameter(
     return Parameter(name, low, high, unit, None if default is None else float(default), note)
 
 
-def parameters(names: str) -> Any:
-    """Declare several parameters without bounds, names apart by spaces or commas; one name gives the symbol, several a tuple."""
+def parameters(
+    names: str, *, lower: float | None = None, upper: float | None = None, unit: str = "", note: str = ""
+) -> Any:
+    """Declare several parameters, names apart by spaces or commas; one name gives the symbol, several a tuple. Bounds, unit and note are
+    those of `parameter` and hold for all of them; none by default."""
     if not isinstance(names, str) or not names.strip() or len(names) > 4000:
         raise DeclarationError("parameters takes one string of names apart by spaces, for example 'E_s nu_s'")
-    found = tuple(parameter(name) for name in names.replace(",", " ").split(" ") if name)
+    more: dict[str, Any] = {"lower": lower, "upper": upper, "unit": unit, "note": note}
+    found = tuple(parameter(name, **more) for name in names.replace(",", " ").split(" ") if name)
     return found[0] if len(found) == 1 else found
 
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..errors import DeclarationError, InputError
-from ..notebook import math
+from ..notebook import math_table
 from .derivative import invariants_of
 from .invariants import InnerLeaf
 from .law import Law
@@ -54,8 +54,8 @@ class Table:
     def __str__(self) -> str:
         return self.text()
 
-    def _repr_latex_(self) -> str:
-        return math([(r.title, r.tex) for r in self.rows])
+    def _repr_markdown_(self) -> str:
+        return math_table([(r.title, r.tex) for r in self.rows])
 
     def json(self) -> str:
         """JSON with the same rows."""

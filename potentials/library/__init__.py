@@ -1,7 +1,8 @@
 """Library of laws, one file per law, and the tables that find them.
 
 `LAWS` maps a name to its `Law`. `ENTRIES` maps it to what is known beside the declaration: where the law comes from, values to try it with,
-and a worked value. `cone`, `cone_values` and `rescaled_pseudo_norm` convert readings of a friction angle and a cohesion.
+and a worked value.
+`cone`, `cone_values`, `triaxial_friction` and `rescaled_pseudo_norm` convert readings of a friction angle and a cohesion.
 """
 
 from . import (
@@ -29,7 +30,7 @@ from . import (
 )
 from ._bingham import bingham
 from ._cam_clay import cam_clay
-from ._cones import cone, cone_values, rescaled_pseudo_norm
+from ._cones import cone, cone_values, rescaled_pseudo_norm, triaxial_friction
 from ._drucker_prager import drucker_prager
 from ._drucker_prager_cap import drucker_prager_cap
 from ._entry import Entry, WorkedValue
@@ -78,6 +79,7 @@ __all__ = [
     "texsol_k2",
     "thermo_elasto_plastic",
     "tresca",
+    "triaxial_friction",
     "von_mises",
     "wire",
 ]

@@ -13,11 +13,11 @@ from __future__ import annotations
 
 from typing import Any
 
-from sympy import Expr, atan, cos, sin, sqrt, sympify, tan
+from sympy import Expr, asin, atan, cos, sin, sqrt, sympify, tan
 
 from ...errors import InputError
 
-__all__ = ["cone", "cone_values", "rescaled_pseudo_norm"]
+__all__ = ["cone", "cone_values", "rescaled_pseudo_norm", "triaxial_friction"]
 
 READINGS = ("shear_limit", "sine", "compression", "extension", "plane_strain")
 FORMS = {"sqrt_J2": 1, "norm": sqrt(2), "q": sqrt(3)}
@@ -58,6 +58,25 @@ def cone_values(a: Any, k: Any) -> dict[str, Any]:
     {'theta_f': 0.1, 'C_0': 5.0}
     """
     return {"theta_f": _plain(atan(3 * sympify(a, strict=True))), "C_0": _plain(sympify(k, strict=True))}
+
+
+def triaxial_friction(theta_f: Any, C_0: Any) -> dict[str, Any]:
+    """`phi` [rad] and `c` [Pa] of the Mohr–Coulomb law that has the strength of the cone √J₂ = C_0 + P tan θ_f in triaxial compression.
+
+    It undoes the reading "compression" of `cone`: with t = tan θ_f, sin φ = √3 t/(2 + t/√3) and c = C_0 √3 (3 − sin φ)/(6 cos φ).
+    `InputError` for a cone so steep (tan θ_f ≥ √3, θ_f ≥ 60°) that no friction angle has it. Source: Drucker and Prager 1952.
+
+    >>> {name: round(x, 6) for name, x in triaxial_friction(*cone_values(*cone(0.6, 5.0, "compression")).values()).items()}
+    {'phi': 0.6, 'c': 5.0}
+    """
+    t = tan(sympify(theta_f, strict=True))
+    sine = sqrt(3) * t / (2 + t / sqrt(3))
+    if sine.is_number and not 0 <= float(sine) < 1:
+        raise InputError(
+            f"theta_f = {theta_f}: no friction angle of Mohr–Coulomb has this strength in compression; it needs 0 to 60°"
+        )
+    cohesion = sympify(C_0, strict=True) * sqrt(3) * (3 - sine) / (6 * sqrt(1 - sine**2))
+    return {"phi": _plain(asin(sine)), "c": _plain(cohesion)}
 
 
 def rescaled_pseudo_norm(factor: Any, *, C_0: Any, H_i: Any) -> dict[str, Any]:

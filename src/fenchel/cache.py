@@ -7,6 +7,7 @@ so that any edit starts from an empty folder.
 
 from __future__ import annotations
 
+import errno
 import functools
 import hashlib
 import importlib.util
@@ -20,7 +21,7 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
-from .errors import StorageError
+from .errors import InputError, StorageError
 
 __all__ = ["cache_folder", "content_hash", "load_text", "njit", "replace_file", "source_hash"]
 
@@ -65,9 +66,13 @@ def replace_file(path: Path | str, data: bytes) -> None:
     except OSError as error:
         if temporary is not None:
             Path(temporary).unlink(missing_ok=True)
+        if error.errno in (errno.EEXIST, errno.ENOTDIR, errno.ENOENT):  # of the folders above it
+            raise InputError(
+                f"{path}: {path.parent} is not a folder and cannot be made one: choose another place"
+            ) from None
+        room = "free some space or " if error.errno in (errno.ENOSPC, errno.EDQUOT, errno.EFBIG) else ""
         raise StorageError(
-            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: "
-            "free some space or choose another place"
+            f"{path}: could not be written ({error.strerror or error}); what was there before is untouched: {room}choose another place"
         ) from None
 
 

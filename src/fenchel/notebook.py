@@ -10,7 +10,7 @@ import html
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, ClassVar
 
-__all__ = ["Summary", "array_cells", "field_cells", "html_table", "math", "text_table"]
+__all__ = ["Summary", "array_cells", "field_cells", "html_table", "math", "math_table", "text_table"]
 
 FEW = 6  # numbers that are listed one by one: a tensor in Mandel components
 
@@ -72,6 +72,23 @@ def math(lines: Mapping[str, str] | Sequence[tuple[str, str]]) -> str:
     pairs = lines.items() if isinstance(lines, Mapping) else lines
     body = " \\\\\n".join(rf"\text{{{word}}} & {formula}" for word, formula in pairs)
     return "$$\\begin{array}{ll}\n" + body + "\n\\end{array}$$"
+
+
+def math_table(rows: Iterable[tuple[str, str]]) -> str:
+    r"""Rows of a word and a formula as a table in Markdown, every formula by itself: one display of all would be too long for MathJax.
+
+    >>> print(math_table([("elastic domain", r"f = \left\|A\right\| - k \leq 0")]))
+    | | |
+    |---|---|
+    | elastic domain | $\displaystyle f = \left\Vert A\right\Vert  - k \leq 0$ |
+    """
+    body = [rf"| {word} | $\displaystyle {_without_bars(formula)}$ |" for word, formula in rows]
+    return "\n".join(["| | |", "|---|---|", *body])
+
+
+def _without_bars(formula: str) -> str:
+    """LaTeX without the bars that would end a cell, and on one line."""
+    return " ".join(formula.replace(r"\|", r"\Vert ").replace("|", r"\vert ").split())
 
 
 class Summary:

@@ -29,7 +29,7 @@ from fenchel.dem.export import (
 from fenchel.dem.measures import Network
 from fenchel.dem.packing import densify
 from fenchel.dem.storage import load_run, save_run
-from fenchel.errors import InputError, StorageError
+from fenchel.errors import InputError
 
 
 @pytest.fixture(scope="module")
@@ -341,7 +341,7 @@ def test_pictures_that_cannot_be_drawn(network: Network, flat: Network, tmp_path
     assert not list(tmp_path.iterdir())
     assert draw_networks(flat).axes[0].get_ylabel() == "y [mm]"
     (tmp_path / "taken").write_text("")
-    with pytest.raises(StorageError):
+    with pytest.raises(InputError, match="choose another place"):
         write_vtk(network, tmp_path / "taken" / "run")
 
 

@@ -127,7 +127,7 @@ def test_the_command_reports_quality_and_generated_code(file: Path, tmp_path: Pa
         "step",
     }
     text = CliRunner().invoke(app, ["dem", str(file), "-o", str(tmp_path / "run.h5"), "--quiet", "--resume"])
-    assert text.exit_code == 0 and "fenchel_dem_pairs" in text.stdout
+    assert text.exit_code == 0 and "code generated for this scene: " in text.stdout and "pairs (" in text.stdout
 
 
 def test_disks_and_a_servo_from_a_file(tmp_path: Path) -> None:

@@ -268,6 +268,19 @@ def test_a_folder_that_cannot_be_written_is_said(lab, capsys):
     assert code == 1 and "cannot be written" in err
 
 
+def test_the_report_of_other_tests_is_not_written_over(lab, capsys):
+    one, other = str(lab / "cd50.csv"), str(lab / "cd200.csv")
+    assert run(capsys, lab, one, "--quiet")[0] == 0
+    before = (lab / "out" / "report.json").read_bytes()
+    code, _, err = run(capsys, lab, one, other, "--quiet")
+    assert code == 2 and err.count("\n") == 1 and "holds the report of cd50: choose another folder" in err
+    assert (lab / "out" / "report.json").read_bytes() == before
+    assert run(capsys, lab, one, "--hold", "nu_s", "--quiet")[0] == 0  # the same tests, once more
+    (lab / "out" / "report.json").write_text("{}")
+    code, _, err = run(capsys, lab, one, "--quiet")
+    assert code == 2 and "something else" in err
+
+
 def test_many_rows_are_thinned_for_the_fit_and_samples_may_share_a_name(tmp_path):
     name = ["# sample = S"]
     paths = [

@@ -105,7 +105,7 @@ def test_wrong_values_are_refused_in_one_line(change, words):
 
 
 def test_a_missing_value_is_named():
-    with pytest.raises(InputError, match="'C_0' has no value"):
+    with pytest.raises(InputError, match=r"'C_0' \[Pa\], .* have no value; give C_0="):
         sand.values({})
 
 

@@ -9,7 +9,7 @@ from sympy import Symbol, sqrt, symbols, tan
 
 from fenchel.errors import InputError
 from fenchel.potentials import Law, dev, forces, indicator, norm, tr
-from fenchel.potentials.library import ENTRIES, LAWS, cone, cone_values, rescaled_pseudo_norm, sand
+from fenchel.potentials.library import ENTRIES, LAWS, cone, cone_values, rescaled_pseudo_norm, sand, triaxial_friction
 
 ROOT = Path(__file__).parents[2]
 ISSUE = """linear_elastic wire sand reinforced_sand texsol drucker_prager von_mises tresca mohr_coulomb rankine cam_clay norton perzyna
@@ -69,6 +69,23 @@ def test_readings_of_a_friction_angle():
     assert np.tan(found["theta_f"]) / 3 == pytest.approx(np.sin(0.4) / 3)
     assert found["C_0"] == pytest.approx(7.0 * np.cos(0.4))
     assert cone_values(Symbol("a"), Symbol("k"))["C_0"] == Symbol("k")
+
+
+@pytest.mark.parametrize(("theta_f", "C_0"), [(0.0, 3e3), (0.079, 2842.0), (0.48, 4e3), (0.48, 0.0), (1.04, 1e3)])
+def test_the_friction_of_a_triaxial_test_is_that_of_the_stresses_at_first_yield(theta_f, C_0):
+    read = triaxial_friction(theta_f, C_0)
+    for P in (1e3, 5e4, 2e5):
+        # triaxial compression on the cone: √J₂ = (σ_r − σ_a)/√3, mean pressure P
+        q = np.sqrt(3.0) * (C_0 + P * np.tan(theta_f))
+        largest, smallest = P + 2.0 * q / 3.0, P - q / 3.0  # principal pressures
+        shear, mean = (largest - smallest) / 2.0, (largest + smallest) / 2.0
+        assert shear == pytest.approx(read["c"] * np.cos(read["phi"]) + mean * np.sin(read["phi"]), rel=1e-12)
+
+
+def test_a_cone_too_steep_for_a_friction_angle_is_refused():
+    for theta_f in (1.05, 1.5, -0.1):
+        with pytest.raises(InputError, match="it needs 0 to 60°"):
+            triaxial_friction(theta_f, 1e3)
 
 
 def test_a_scaled_pseudo_norm_is_the_same_law_with_scaled_hardening():

@@ -198,7 +198,7 @@ def test_show_refuses_what_has_no_meaning(tmp_path, capsys):
     assert cli.main(["show", "tresca", *TRESCA]) == 2
     assert "--plot" in capsys.readouterr().err
     assert cli.main(["show", "tresca", "--plot", str(tmp_path / "a.png")]) == 2
-    assert "has no value" in capsys.readouterr().err
+    assert "have no value" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
 
 

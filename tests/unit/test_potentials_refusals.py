@@ -352,7 +352,7 @@ def test_nothing_is_written_or_run_for_a_refused_declaration(tmp_path, monkeypat
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ({"H_k": -1.0}, "'H_k' = -1 lies outside \\[0, inf\\]; softening is not modelled"),
+        ({"H_k": -1.0}, "'H_k' = -1 lies outside \\[0, inf\\] Pa; softening is not modelled"),
         ({"H_i": -1e-12}, "'H_i'.*softening is not modelled"),
         ({"C_0": -1.0}, "'C_0' = -1 lies outside"),
         ({"nu_s": 0.7}, "'nu_s' = 0.7 lies outside \\[-1, 0.5\\]"),
@@ -371,7 +371,7 @@ def test_a_value_outside_its_bounds_is_refused_by_name(change, words):
 
 def test_a_missing_value_is_asked_for():
     values = {name: value for name, value in ENTRIES["sand"].values.items() if name != "C_0"}
-    refused(lambda: LAWS["sand"].values(values), "'C_0' has no value; give C_0=", InputError)
+    refused(lambda: LAWS["sand"].values(values), r"'C_0' \[Pa\] has no value; give C_0=", InputError)
 
 
 GIVEN = dict(E=1.0, nu=0.2)

@@ -15,6 +15,9 @@ from .task import progress_file, read_progress
 __all__ = ["Bars"]
 
 
+SURE = 0.05  # share of the work below which no time left is told: the first tasks compile
+
+
 class _Named(Protocol):
     @property
     def name(self) -> str: ...
@@ -77,7 +80,7 @@ class Bars:
 
     def _left(self, share: float) -> str:
         """Time left by rule of three."""
-        if share <= 0.0:
+        if share < SURE:
             return "–"
         seconds = int((time.monotonic() - self.started) * (1.0 - share) / share)
         return f"{seconds // 60}:{seconds % 60:02d}"

@@ -24,6 +24,14 @@ app = typer.Typer(
 )
 
 
+STOPPED = 130
+_KEPT = {
+    "dem": "the run file holds its last checkpoint: the same command with --resume goes on from there",
+    "identify": "finished runs and checkpoints are kept: the same command goes on from there",
+    "reproduce": "finished runs and checkpoints are kept: the same command goes on from there",
+}
+
+
 def _version(wanted: bool) -> None:
     if wanted:
         from fenchel import __version__
@@ -57,6 +65,7 @@ def main(arguments: list[str] | None = None) -> int:
         line, code = one_line(problem)
         print(line, file=sys.stderr)
     except KeyboardInterrupt:
-        print("fenchel: stopped; finished runs and checkpoints are kept", file=sys.stderr)
-        code = 130
+        code = STOPPED
+    if code == STOPPED:  # typer turns Ctrl-C into this code and says nothing
+        print(f"fenchel: stopped; {_KEPT.get(given[0], 'nothing was written in part')}", file=sys.stderr)
     return code if isinstance(code, int) else 0

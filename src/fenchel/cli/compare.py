@@ -9,7 +9,7 @@ import typer
 
 from .laws import LAW
 from .progress import notice
-from .signs import SIGNS, Signs, turn_path
+from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
@@ -36,7 +36,9 @@ def _compare(
     output: Path | None = typer.Option(None, "-o", "--output", metavar="OUT.csv", help="Write the table of the runs."),
     json_wanted: bool = typer.Option(False, "--json", help="Print everything as JSON."),
 ) -> None:
-    """A path through every formulation and solver: differences, duality gap, order in step size, time, and which formulation suits best.
+    """One path by every formulation and solver.
+
+    Told are differences, duality gaps, the order in the step size, times, and which formulation suits best.
 
     Exit code 0 if all runs that can follow the path agree, 1 if they do not or none can.
 
@@ -49,7 +51,7 @@ def _compare(
     from .tables import csv_text, print_json
 
     values = parameter_values(pairs, parameters)
-    plan = turn_path(read_path(path), signs)
+    plan = read_path(path, signs=signs.value)
     declared = load_law(law)
     with notice() as told:
         found = compare(declared, plan, values, tolerance=tolerance, sampled_rows=sampled, progress=told)

@@ -35,7 +35,9 @@ def _contact(
     ),
     json_wanted: bool = typer.Option(False, "--json", help="Print the result as JSON."),
 ) -> None:
-    """Solve one contact problem u = W r + q with Coulomb friction as given, and report every error measure.
+    """Solve a contact problem with Coulomb friction.
+
+    The problem is u = W r + q as given; every error measure is reported.
 
     The errors are recomputed from the reactions by code that the solvers do not share. Exit code 1: the tolerance was not reached.
 
@@ -44,14 +46,17 @@ def _contact(
     from fenchel.dem.one_step import read_fclib, solve
     from fenchel.dem.one_step.solve import describe
 
+    from .progress import waiting
     from .tables import print_json, print_table
 
     given = read_fclib(problem)
-    solution = solve(given, solver=solver, tolerance=tolerance, time_limit=time_limit, keep_unconverged=True)
+    with waiting(f"solving {problem} ({given.contact_count} contacts)"):
+        solution = solve(given, solver=solver, tolerance=tolerance, time_limit=time_limit, keep_unconverged=True)
     notes = []
     if not given.symmetric:
         notes.append(f"W is not symmetric (relative part {given.asymmetry:.1e}): the problem was solved as given")
-    certified, how = _certified(given, solution.r) if certify else (None, "")
+    with waiting("certifying by a cone program"):
+        certified, how = _certified(given, solution.r) if certify else (None, "")
     if how:
         notes.append(how)
     if not solution.converged:

@@ -41,7 +41,10 @@ def _dem(
     quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the quality of the run as JSON."),
 ) -> None:
-    """Make a sample of grains and wires, test it, and write its run file; the last tables say how well it was solved, and by which code.
+    """Run a scene of grains and wires.
+
+    A sample is made, tested, and written to its run file; told are stress and strain at the
+    end, how well it was solved, and the last state.
 
     A scene with a table [motion] instead of [triaxial] lets bodies move freely: grains, planes, floors, chains. One with a table [slope]
     releases a block of grains and wires on a rough floor and measures its slope.
@@ -87,8 +90,12 @@ def _dem(
             }
         )
     else:
+        typer.echo(f"{output}: {len(record.leg)} frames, confining pressure {record.pressure / 1e3:g} kPa")
+        typer.echo(_final(record, signs))
         rows = [(name, value, *QUALITY[name]) for name, value in record.quality.items()]
-        print_table(("quality", "value", "unit", "meaning"), rows, title=f"{output}: {len(record.leg)} frames")
+        print_table(
+            ("quality", "value", "unit", "meaning"), rows, title="how well it was solved (page Read the residuals)"
+        )
         _print_kernels(load_run(output)[0].get("kernels", {}))
         _print_state(measures, exported)
         _print_accuracy(output, record.quality["natural_map_max"])
@@ -202,10 +209,23 @@ def _print_state(measures: dict[str, float], exported: list[Path]) -> None:
 
 
 def _print_kernels(report: dict[str, Any]) -> None:
-    """The generated code of a scene and what a row costs in memory."""
-    from .tables import print_table
-
-    names = str(report.get("names", "")).split()
+    """What the code that was generated for the scene does, and what a row of it costs in memory."""
     size = report.get("bytes", {})
-    rows = [(name, size.get(name.split("_")[2], "")) for name in names]
-    print_table(("generated code", "bytes a row"), rows)
+    kinds = [name.split("_")[2] for name in str(report.get("names", "")).split()]
+    if kinds:
+        told = ", ".join(f"{kind} ({size[kind]} bytes a row)" if size.get(kind) else kind for kind in kinds)
+        typer.echo(f"code generated for this scene: {told}")
+
+
+def _final(record: Any, signs: Signs) -> str:
+    """What the test ended at, in a line: stresses of the walls, strains of the box under `signs`."""
+    import numpy as np
+
+    sign = 1.0 if signs is Signs.tension else -1.0
+    stress, strain = record.wall_stress[-1], record.wall_strain[-1]
+    q = 0.5 * (stress[0] + stress[1]) - stress[2]
+    word = "extension" if sign > 0.0 else "compression"
+    return (
+        f"at the end: p = {-float(np.mean(stress[:3])) / 1e3:.5g} kPa, q = {q / 1e3:.5g} kPa (positive when pressed along z), "
+        f"axial strain {sign * float(record.axial_strain[-1]):.4%}, volume strain {sign * float(np.sum(strain[:3])):.4%} ({word} positive)"
+    )

@@ -13,7 +13,10 @@ def register(app: typer.Typer) -> None:
 
 
 def _doctor(json_wanted: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
-    """Versions, cache, threads, free disk, and whether compiler and cone solver work; exit code 1 if something needed does not.
+    """Is everything there and working?
+
+    Versions, cache, threads, free disk, and whether compiler and cone solver work; exit code 1 if something needed does not. The cache
+    holds compiled code only: its folder may be deleted at any time.
 
     Example: fenchel doctor
     """
@@ -30,9 +33,9 @@ def _doctor(json_wanted: bool = typer.Option(False, "--json", help="Print JSON."
         print_json({"healthy": healthy, "findings": items})
     else:
         rows = [
-            (item.name, item.value, "" if item.fine else ("MISSING" if item.needed else "not there"), item.remedy)
+            (item.name, item.value, "" if item.fine else ("MISSING" if item.needed else "optional"), item.remedy)
             for item in findings
         ]
-        print_table(("what", "found", "", "remedy"), rows)
+        print_table(("what", "found", "state", "remedy"), rows)
     if not healthy:
         raise typer.Exit(1)

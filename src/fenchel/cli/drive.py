@@ -10,7 +10,8 @@ import typer
 
 from .figures import figure_kind, write_figure
 from .laws import LAW, Formulation
-from .signs import SIGNS, Signs, turn_columns, turn_path
+from .progress import waiting
+from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
@@ -18,6 +19,9 @@ if TYPE_CHECKING:
     from fenchel.potentials import Law
 
 __all__ = ["register", "write_text"]
+
+
+LARGE = 0.5  # a strain beyond this is taken for one in per cent
 
 
 class Solver(StrEnum):
@@ -60,7 +64,17 @@ def _drive(
     certify: bool = typer.Option(False, "--certify", help="Add the duality gap of every step [J/m3]."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the history as JSON."),
 ) -> None:
-    """A material point along a path of prescribed strains and stresses; a component without column has zero stress.
+    """Drive a material point along a path.
+
+    PATH.csv has a column t [s] and per component xx, yy, zz, yz, xz, xy either a strain (eps_zz, a fraction; shear not doubled) or a stress
+    (sig_zz, Pa); eps_v or p replaces one normal component; a component without column has zero stress. The first row is the virgin state:
+    zeros. Uniaxial stress up to one per cent and back:
+
+    \b
+        t,eps_zz
+        0,0
+        1,0.01
+        2,0
 
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
 
@@ -76,20 +90,25 @@ def _drive(
     if plot is not None:
         figure_kind(plot)
     values = parameter_values(pairs, parameters)
-    plan = turn_path(read_path(path), signs)
+    plan = read_path(path, signs=signs.value)
     declared = load_law(law)
-    update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
     if certify and solver is Solver.explicit:
         raise InputError(
             "--certify: an explicit step is not the minimum of a program and has no gap: leave --certify out"
         )
-    history = drive(update, plan, values)
-    columns: dict[str, Any] = dict(history_columns(history, plan.time))
-    if certify:
-        columns["gap"] = _gaps(declared, history, values, plan.time, plan.temperature)
-    columns = turn_columns(columns, signs)
+    for file in (output, plot):
+        if file is not None and file.exists() and file.samefile(path):
+            raise InputError(f"{file} is the path itself: give the history another name")
+    with waiting(f"driving law '{declared.name}'"):
+        update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
+        history = drive(update, plan, values)
+        columns: dict[str, Any] = dict(history_columns(history, plan.time, signs.value))
+        if certify:
+            columns["gap"] = _gaps(declared, history, values, plan.time, plan.temperature)
+    _warn_of_size(path, history)
     if plot is not None:
         write_figure(history.plot(signs=signs.value, title=declared.name), plot)
+        typer.echo(f"figure in {plot}", err=True)
     if output is not None:
         write_text(output, csv_text(columns))
     if json_wanted:
@@ -97,8 +116,23 @@ def _drive(
     elif output is not None:
         typer.echo(f"{len(plan.time)} steps in {output}")
     else:
-        shown = {name: column for name, column in columns.items() if _worth_showing(name, column, columns)}
+        shown = {
+            name: _without_noise(name, column, columns)
+            for name, column in columns.items()
+            if _worth_showing(name, column, columns)
+        }
         print_table(tuple(shown), zip(*(column.tolist() for column in shown.values()), strict=True))
+
+
+def _warn_of_size(path: Path, history: History) -> None:
+    """A line on standard error where strains are so large that they were probably meant in per cent."""
+    largest = float(abs(history.eps).max())
+    if largest > LARGE:
+        typer.echo(
+            f"fenchel: {path}: the strain reaches {largest:.3g}, that is {largest:.0%}: strains are fractions, not per cent, and laws are "
+            "for small strains",
+            err=True,
+        )
 
 
 def _worth_showing(name: str, column: Any, columns: dict[str, Any]) -> bool:
@@ -109,6 +143,17 @@ def _worth_showing(name: str, column: Any, columns: dict[str, Any]) -> bool:
         return False
     largest = max(abs(other).max() for key, other in columns.items() if key[:4] == name[:4] and key.count("_") == 1)
     return bool(abs(column).max() > 1e-9 * largest)
+
+
+def _without_noise(name: str, column: Any, columns: dict[str, Any]) -> Any:
+    """The column with what is rounding beside the largest of its kind as zero: the file has every digit."""
+    import numpy as np
+
+    kind = "eps_" if name.startswith("eps_") else "sig_" if name.startswith("sig_") or name in ("p", "q") else ""
+    if not kind:
+        return column
+    largest = max((abs(other).max() for key, other in columns.items() if key.startswith(kind)), default=0.0)
+    return np.where(abs(column) > 1e-12 * largest, column, 0.0)
 
 
 def write_text(output: Path, text: str) -> None:

@@ -19,7 +19,7 @@ def one_line(problem: Exception) -> tuple[str, int]:
     if isinstance(problem, FenchelError):
         text, code = str(problem), problem.exit_code
     elif isinstance(problem, typer.TyperException):
-        text, code = problem.format_message(), problem.exit_code
+        text, code = problem.format_message().replace("Value error, ", ""), problem.exit_code
         context = getattr(problem, "ctx", None)
         if context is not None:
             text += f' (see "{context.command_path} --help")'
@@ -44,6 +44,8 @@ def _of_system(problem: OSError) -> tuple[str, int]:
         )
     if problem.errno in _NO_LEAVE:
         return f"{where}not permitted ({what}): choose a place that you may read and write", 1
-    if isinstance(problem, FileNotFoundError | IsADirectoryError | NotADirectoryError):
+    if isinstance(problem, IsADirectoryError):
+        return f"{where}{what}: name a file, as in {problem.filename or 'FOLDER'}/NAME", 2
+    if isinstance(problem, FileNotFoundError | NotADirectoryError | FileExistsError):
         return f"{where}{what}: give the path of an existing file", 2
     return f"{where}{what}", 1

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from .figures import figure_kind, write_figure
+from .progress import waiting
 from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
 
@@ -29,6 +30,13 @@ class Formulation(StrEnum):
     stress = "stress"
 
 
+class Measure(StrEnum):
+    """Which equivalent stress is drawn: √J₂, or q = √(3 J₂)."""
+
+    sqrt_J2 = "sqrt_J2"
+    q = "q"
+
+
 class Split(StrEnum):
     """Which strain the table is written in: the whole, or its reversible part."""
 
@@ -44,7 +52,7 @@ def register(app: typer.Typer) -> None:
 
 
 def _laws(json_wanted: bool = typer.Option(False, "--json", help="Print JSON.")) -> None:
-    """The library of laws: name, one line, parameters with units.
+    """The library of laws, with their parameters.
 
     Example: fenchel laws
     """
@@ -89,9 +97,18 @@ def _show(
     ),
     pairs: list[str] = VALUES,
     parameters: Path | None = PARAMETERS,
+    pressure: float | None = typer.Option(
+        None,
+        "--pressure",
+        metavar="Pa",
+        help="Mean pressure of the deviatoric plane that is drawn, positive in compression.",
+    ),
+    measure: Measure = typer.Option(Measure.sqrt_J2, "--measure", help="Equivalent stress of the meridian plane."),
     signs: Signs = SIGNS,
 ) -> None:
-    """Table 1 of a law: its potentials, state laws and complementary laws; with --plot also its figure.
+    """Table 1 of a law, and its figure.
+
+    Printed are its potentials, state laws and complementary laws; --plot draws its surfaces and energies.
 
     Example: fenchel show sand --formulation strain
 
@@ -113,7 +130,19 @@ def _show(
     if plot is not None:
         from fenchel.potentials.law_figure import law_figure
 
-        write_figure(law_figure(declared, parameter_values(pairs, parameters), signs=signs.value), plot)
+        with waiting(f"drawing law '{declared.name}'"):
+            write_figure(
+                law_figure(
+                    declared,
+                    parameter_values(pairs, parameters),
+                    signs=signs.value,
+                    pressure=pressure,
+                    measure=measure.value,
+                ),
+                plot,
+            )
+    if plot is not None:
+        typer.echo(f"figure in {plot}", err=True)
     if json_wanted:
         content = table.json()
         if isinstance(content, str):
@@ -130,7 +159,9 @@ def _check(
     parameters: Path | None = PARAMETERS,
     json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
 ) -> None:
-    """Whether a law is admissible: exit code 0 if proved, 1 if refuted or undecided, 2 if it is not a valid declaration.
+    """Is a law admissible?
+
+    Exit code 0 if that is proved, 1 if refuted or undecided, 2 if it is not a valid declaration.
 
     Without values the answer holds for all parameters that keep the conditions printed; values decide the conditions.
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -11,8 +12,9 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from fenchel.dem import Progress
 
-__all__ = ["notice", "progress_bar"]
+__all__ = ["notice", "progress_bar", "waiting"]
 
+_PATIENCE = {True: 1.5, False: 20.0}  # s before a wait is explained, on a terminal and elsewhere
 _QUIET = 2.0  # s before a notice tells anything
 _PACE_OF_NOTICES = 5.0  # s between two notices where there is no terminal
 _PACE_OF_LINES = 15.0  # s between two lines where there is no terminal
@@ -89,3 +91,16 @@ def notice() -> Iterator[Callable[[float, str], None]]:
     finally:
         if shown and terminal:
             print(f"\r{'':<60}\r", end="", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def waiting(what: str) -> Iterator[None]:
+    """Says on standard error what takes so long, once, if it does: a law or a solver that is new is compiled first."""
+    line = f"{what}: code that is new is compiled first, once, and kept (fenchel doctor says where) ..."
+    timer = threading.Timer(_PATIENCE[sys.stderr.isatty()], lambda: print(line, file=sys.stderr, flush=True))
+    timer.daemon = True
+    timer.start()
+    try:
+        yield
+    finally:
+        timer.cancel()

@@ -27,7 +27,9 @@ def _reproduce(
     quiet: bool = typer.Option(False, "--quiet", help="Show no progress."),
     json_wanted: bool = typer.Option(False, "--json", help="Print claims.json."),
 ) -> None:
-    """Run the reference study of wire-reinforced sand and say of each claim: pass, fail or undecided, with the figures.
+    """Run the reference study, claim by claim.
+
+    The study is that of wire-reinforced sand; each of its claims passes, fails or stays undecided, with the figures.
 
     Writes DIR/report.html, DIR/claims.json and DIR/runs/*.h5. Finished runs stay: the same command takes them up after an interruption.
 

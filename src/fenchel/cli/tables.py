@@ -12,6 +12,7 @@ from typing import Any
 __all__ = ["csv_text", "number", "print_json", "print_table"]
 
 _WIDTH_OF_A_FILE = 140
+_WORDS = 16  # room that a column of words asks for; they are folded
 
 
 def print_json(data: Any) -> None:
@@ -21,19 +22,44 @@ def print_json(data: Any) -> None:
 
 
 def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, title: str | None = None) -> None:
-    """Print rows under column heads; numbers by `number`, everything else as text."""
+    """Print rows under column heads; numbers by `number`, everything else as text.
+
+    Numbers are never broken: columns that do not fit beside one another follow in a table of their own below, the first column with them.
+    """
     from rich import box
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
     console = Console(width=None if sys.stdout.isatty() else _WIDTH_OF_A_FILE)
-    table = Table(title=title, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
-    for column in columns:
-        table.add_column(column, overflow="fold")
-    for row in rows:
-        table.add_row(*(Text(number(cell) if isinstance(cell, float) else str(cell)) for cell in row))
-    console.print(table)
+    body = [list(row) for row in rows]
+    cells = [[number(cell) if isinstance(cell, float) else str(cell) for cell in row] for row in body]
+    broken = [any(not isinstance(row[k], (int, float)) for row in body) for k in range(len(columns))]
+    longest = [max(len(head), *(len(row[k]) for row in cells), 0) for k, head in enumerate(columns)]
+    widths = [min(longest[k], max(_WORDS, len(head))) if broken[k] else longest[k] for k, head in enumerate(columns)]
+    for n, group in enumerate(_groups(widths, console.width)):
+        table = Table(title=title if n == 0 else None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+        for k in group:
+            table.add_column(columns[k], overflow="fold", no_wrap=not broken[k])
+        for row in cells:
+            table.add_row(*(Text(row[k]) for k in group))
+        console.print(table)
+
+
+def _groups(widths: Sequence[int], room: int) -> list[list[int]]:
+    """Columns that fit beside one another, the first one in every group.
+
+    >>> _groups([4, 30, 30, 30], 80), _groups([4, 30], 20)
+    ([[0, 1, 2], [0, 3]], [[0, 1]])
+    """
+    gap, edge = 3, 2  # as rich sets them
+    groups: list[list[int]] = [[0]] if widths else []
+    for k in range(1, len(widths)):
+        taken = sum(widths[j] + gap for j in groups[-1])
+        if len(groups[-1]) > 1 and taken + widths[k] + edge > room:
+            groups.append([0])
+        groups[-1].append(k)
+    return groups
 
 
 def csv_text(columns: Mapping[str, Any]) -> str:
@@ -47,12 +73,12 @@ def csv_text(columns: Mapping[str, Any]) -> str:
 
 
 def number(value: float) -> str:
-    """Six significant digits, without trailing zeros.
+    """Six significant digits, without trailing zeros; zero has no sign.
 
-    >>> number(1.0e8), number(0.25)
-    ('1e+08', '0.25')
+    >>> number(1.0e8), number(0.25), number(-0.0)
+    ('1e+08', '0.25', '0')
     """
-    return f"{value:.6g}"
+    return f"{value + 0.0:.6g}"
 
 
 def _plain(data: Any) -> Any:

@@ -11,6 +11,7 @@ import typer
 from ..errors import InputError
 from .campaign import JOBS, SCHEDULER
 from .laws import LAW
+from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
 
 if TYPE_CHECKING:
@@ -30,7 +31,8 @@ _app = typer.Typer(
     no_args_is_help=True,
     add_completion=False,
     rich_markup_mode=None,
-    help="Speed against accuracy, measured: a table, front.json and front.svg, and the cheapest setting for a wanted accuracy.\n\n"
+    help="Measure speed against accuracy.\n\n"
+    "Written are a table, front.json and front.svg, and told is the cheapest setting for a wanted accuracy.\n\n"
     "Example: fenchel tradeoff law cam_clay -o front --accuracy 1e-6",
 )
 
@@ -54,6 +56,7 @@ def _law(
     threads: list[int] = typer.Option([1, 2], "--threads", min=1, help="Numbers of threads to time; may be repeated."),
     time_step: float = typer.Option(1.0, "--dt", help="Time step of the random points [s]; matters to viscous laws."),
     temperature: float = typer.Option(300.0, "--temperature", help="Of laws that have one [K]."),
+    signs: Signs = SIGNS,
     keep: bool = KEEP,
     quiet: bool = QUIET,
     json_wanted: bool = JSON,
@@ -73,7 +76,7 @@ def _law(
     declared = load_law(law)
     values = dict(ENTRIES[law].values) if law in ENTRIES else {}
     values |= parameter_values(pairs, parameters)
-    plan = None if path is None else read_path(path)
+    plan = None if path is None else read_path(path, signs=signs.value)
     wanted = _accuracies(accuracies, (1e-3, 1e-6, 1e-9))
     with _told(quiet) as tell:
         found = measure_law(

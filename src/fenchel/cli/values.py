@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import typer
@@ -29,9 +30,28 @@ def parameter_values(pairs: list[str], file: Path | None = None) -> dict[str, fl
         try:
             value = float(text)
         except ValueError:
-            raise InputError(f'-p {name}: "{text}" is not a number') from None
+            raise InputError(f'-p {name}: "{text}" is not a number{_meant(name, text)}') from None
         given[name] = _finite(f"-p {name}", value)
     return {**values, **given}
+
+
+def _meant(name: str, text: str) -> str:
+    """What to write in place of a decimal comma or of a number with a unit."""
+    comma = text.strip().replace(",", ".")
+    if text.count(",") == 1 and _is_number(comma):
+        return f": write -p {name}={comma}"
+    digits = re.match(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?", text)
+    if digits and _is_number(digits.group()):
+        return ": give the value in SI units without a unit, as in 200e9 for 200 GPa"
+    return ""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True
 
 
 def _from_file(file: Path) -> dict[str, float]:

@@ -6,6 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..errors import InputError
+
 if TYPE_CHECKING:
     from .identification import Identification
 
@@ -86,6 +88,20 @@ def _yield(found: Identification) -> list[str]:
             "line of the law through a curved onset of yield meets zero pressure."
         )
     return out
+
+
+def friction_words(theta_f: float, C_0: float) -> list[str]:
+    """What friction angle and cohesion of a cone are in the words of a triaxial test; nothing for a cone that is too steep for one."""
+    from fenchel.potentials.library import triaxial_friction
+
+    try:
+        read = triaxial_friction(theta_f, C_0)
+    except InputError:
+        return []
+    return [
+        f"First yield of the law in triaxial compression is that of Mohr–Coulomb with φ′ = {np.degrees(read['phi']):.1f}° and "
+        f"c′ = {_kilo(read['c'])} kPa; θ_f = {np.degrees(theta_f):.1f}° is the slope of √J₂ over the mean pressure, another angle."
+    ]
 
 
 def _hardening(found: Identification) -> list[str]:
@@ -173,7 +189,9 @@ def _wires(found: Identification) -> list[str]:
 
 def findings(found: Identification) -> tuple[str, ...]:
     """Sentences for the head of the report."""
-    out = [*_replay(found), *_yield(found), *_hardening(found), *_elastic(found), *_wires(found)]
+    hard = found.pooled.hardening
+    usual = friction_words(hard.joint.parameters.theta_f, hard.joint.parameters.C_0) if hard is not None else []
+    out = [*_replay(found), *_yield(found), *usual, *_hardening(found), *_elastic(found), *_wires(found)]
     ends = [m for m in found.mismatches if m.linked and np.isfinite(m.end_of_first_leg)]
     if ends:
         value = float(np.mean([m.end_of_first_leg for m in ends]))

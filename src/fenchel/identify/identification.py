@@ -32,6 +32,9 @@ ENTANGLED = "friction, cohesion and hardening not separable"
 REPLICA_FRAMES = 100  # per test: a coarser path shifts all octant replicas alike, not their spread
 
 
+LAW_NAMES = ("E_s", "E_w", "nu", "theta_f", "C_0", "H_eff", "H_k", "H_i")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Control:
     """The same beads unlinked: its own identification, and what the links change (linked − control, paired by sample)."""
@@ -78,14 +81,19 @@ class Identification(Summary):
 
     def plot_intervals(self) -> Any:
         """A matplotlib figure: the values with the intervals in which another sample is expected, each over its value."""
-        return shown(estimate_figure(self.estimates))
+        return shown(estimate_figure(self.law_estimates))
 
     def _title(self) -> str:
         levels = ", ".join(f"{level / 1e3:g}" for level in self.fitted)
         return f"a law identified from {len(self.seeds)} sample(s) at {levels} kPa"
 
     def _rows(self) -> list[tuple[str, ...]]:
-        return estimate_rows(self.estimates)
+        return estimate_rows(self.law_estimates)
+
+    @property
+    def law_estimates(self) -> dict[str, Estimate]:
+        """The estimates of the parameters of the law, with H_eff = H_k (½ + tan² θ_f/3) + H_i; `estimates` also has what led to them."""
+        return {name: self.estimates[name] for name in LAW_NAMES if name in self.estimates}
 
     def to_json(self) -> dict[str, Any]:
         """Plain numbers, strings, lists and dicts; arrays over frames are left out, nan becomes None."""

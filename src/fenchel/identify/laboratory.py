@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
@@ -30,7 +31,8 @@ def identify_laboratory(
 
     `law` is a name of the library or `file.py:name`. `start` and `hold` as in `fit_laboratory`. `signs` are those of the files and of the
     axes of the report. `confining_pressures` [Pa], one per file, `held_out` after `files`, take the place of the comment lines.
-    Errors as of `read_laboratory`, `fit_laboratory` and `write_laboratory_report`; nothing is written before all is computed.
+    Errors as of `read_laboratory`, `fit_laboratory` and `write_laboratory_report`, and `InputError` where `directory` holds the report of
+    other tests; nothing is written before all is computed.
     """
     from ..potentials import load_law
 
@@ -44,6 +46,8 @@ def identify_laboratory(
     levels = confining_pressures or [None] * len(paths)
     tests = [read_laboratory(p, signs=signs, confining_pressure=level) for p, level in zip(paths, levels, strict=True)]
     declared = load_law(law)
+    if directory is not None:
+        _check_folder(Path(directory), [test.name for test in tests])
     fit = fit_laboratory(
         declared,
         tests[: len(files)],
@@ -60,6 +64,22 @@ def identify_laboratory(
         place = None if law in LAWS else Path(law.rpartition(":")[0])
         write_laboratory_report(fit, directory, signs=signs, law_file=place)
     return fit
+
+
+def _check_folder(folder: Path, names: list[str]) -> None:
+    """A report of the same tests may be made again; one of others is kept."""
+    report = folder / "report.json"
+    try:
+        content = json.loads(report.read_text(encoding="utf-8"))
+        there = sorted(test["name"] for test in content["tests"])
+    except FileNotFoundError:
+        return
+    except (OSError, ValueError, KeyError, TypeError):
+        there = []
+    if there != sorted(names):
+        raise InputError(
+            f"{folder}: holds the report of {', '.join(there) or 'something else'}: choose another folder, or remove that report"
+        )
 
 
 def _tell(text: str) -> None:

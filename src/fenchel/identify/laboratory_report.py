@@ -15,9 +15,10 @@ from .. import __version__
 from ..drawing import Signs, picture
 from ..errors import StorageError
 from .estimate_view import estimate_figure
+from .findings import friction_words
 from .html import figure_html, page_html, table_html
 from .jsonable import jsonable
-from .laboratory_figures import curve_figure, path_figure
+from .laboratory_figures import CONES, curve_figure, path_figure
 from .laboratory_fit import LaboratoryFit, LaboratoryReplay
 from .laboratory_law import laboratory_files
 from .report_tables import estimate_row, number
@@ -51,6 +52,8 @@ def laboratory_findings(fit: LaboratoryFit) -> list[str]:
                 f"Held out, {_called(replay)}: predicted with an error of {replay.error_q:.1%} in q and "
                 f"{replay.error_second:.1%} in {_second(replay.test.drained)}."
             )
+    if fit.law_name in CONES:
+        out += friction_words(fit.values["theta_f"], fit.values["C_0"])
     for e in fit.estimates.values():
         if e.note and e.note != "held":
             out.append(f"{e.name}: {e.note}.")

@@ -48,7 +48,7 @@ def figures(found: Identification, info: RunsInfo, signs: Signs) -> list[_Figure
         _Figure(
             "intervals",
             "The identified values (dots) with the interval in which another sample is expected, over themselves; rings: single samples.",
-            lambda: estimate_figure(found.estimates),
+            lambda: estimate_figure(found.law_estimates),
         ),
         _Figure(
             "stress",
@@ -107,6 +107,8 @@ def _page(found: Identification, info: RunsInfo, signs: Signs) -> str:
     files = "".join(f"<li><code>{escape(name)}</code></li>" for name in info.files)
     parts = [
         f"<h1>{escape(info.title)}</h1>",
+        "<p>How well a law with linear hardening follows these grains: what was found, the least flattering first. A replay good to "
+        "ten or twenty per cent is what such a law can do; the figures below show where it fails.</p>",
         f'<ul class="findings">{sentences}</ul>{notes}',
         "<h2>The law</h2>",
         put("values", "intervals", "stages"),

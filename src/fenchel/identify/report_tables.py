@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .hardening import Stage
-from .identification import Identification
+from .identification import LAW_NAMES, Identification
 from .interval import Estimate
 from .laboratory_interval import LaboratoryEstimate
 from .runs_info import RunsInfo
@@ -104,7 +104,6 @@ def _values(found: Identification) -> list[Table]:
     def rows(names: Sequence[str]) -> tuple[tuple[str, ...], ...]:
         return tuple(estimate_row(_SYMBOLS[n], found.estimates[n]) for n in names if n in found.estimates)
 
-    main = ("E_s", "E_w", "nu", "theta_f", "C_0", "H_eff", "H_k", "H_i")
     level = f"{found.options.confidence:.0%}"
     by_pressure = [n for n in found.estimates if "@" in n]
     return [
@@ -113,13 +112,13 @@ def _values(found: Identification) -> list[Table]:
             caption=f"The law. {level} intervals are for another sample: from the scatter between seeds, or "
             "from leaving out each octant of the measuring sphere where that is larger.",
             head=_HEAD,
-            rows=rows(main),
+            rows=rows(LAW_NAMES),
         ),
         Table(
             key="readings",
             caption="Other readings of the same tests",
             head=_HEAD,
-            rows=rows([n for n in _SYMBOLS if n not in main]),
+            rows=rows([n for n in _SYMBOLS if n not in LAW_NAMES]),
         ),
         Table(
             key="by_pressure",
@@ -147,7 +146,7 @@ def _stages(found: Identification) -> Table:
         return [
             number(p.E_s / 1e6),
             number(p.theta_f),
-            number(p.C_0 / 1e3),
+            number(p.C_0 / 1e3) if p.C_0 >= 1.0 else "0",
             number(stage.H_eff / 1e6),
             number(p.H_k / 1e6) if apart else "not separable",
             number(p.H_i / 1e6) if apart else "not separable",
