@@ -211,7 +211,7 @@ def energy_panels(axes: Any, pair: EnergyPair, direction: Any, factor: float) ->
     ]
     if rest != 0.0:
         notes.append(
-            f"Both are shifted to be zero without strain: from ψ is taken {engineered(rest, 'J/m³')}, stored by hardening; ψ* has it more."
+            f"Both are shifted to be zero without strain: from ψ is taken its value there, {engineered(rest, 'J/m³')}; ψ* has it more."
         )
     if pair.how == "closed form":
         notes.append(f"ψ* is its closed form; |ψ + ψ* − σ:ε| ≤ {engineered(pair.residual, 'J/m³')} on the curve.")

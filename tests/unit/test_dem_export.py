@@ -179,9 +179,7 @@ def test_a_series_is_a_collection_of_instants(network: Network, tmp_path: Path) 
 
 
 def test_the_library_of_paraview_reads_it(network: Network, flat: Network, tmp_path: Path) -> None:
-    vtk = pytest.importorskip(
-        "vtk", reason="vtk is not installed: it is too large for the locks; see the tests without it"
-    )
+    import vtk  # pyright: ignore[reportMissingImports]
     from vtk.util.numpy_support import vtk_to_numpy  # pyright: ignore[reportMissingImports]
 
     for state in (network, flat):

@@ -226,7 +226,6 @@ def test_a_view_without_pyvista_says_what_to_install(run: Run, monkeypatch: pyte
 
 
 def test_a_view_with_pyvista(run: Run) -> None:
-    pytest.importorskip("pyvista", reason="pyvista is the optional extra fenchel[view]: not in the locks")
     plotter = run.view(show=False)
     assert [title.strip() for title in list(plotter.scalar_bars.keys())] == ["pressure of a body [kPa]"]
     assert plotter.screenshot(None, return_img=True).std() > 1.0

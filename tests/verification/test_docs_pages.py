@@ -17,7 +17,7 @@ ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
 CELL = re.compile(r"^```\{code-cell\}[^\n]*\n(.*?)^```\s*$", flags=re.DOTALL | re.MULTILINE)
 FOLDERS = ("tutorials", "howto")
-REFERENCE = ("reference/messages.md",)  # what the program itself is asked for
+REFERENCE = ("reference/messages.md", "reference/command_line.md")  # what the program itself is asked for
 
 # Seconds for their cells, on one core and with code compiled before: `make test` runs these, `make validate` all others.
 QUICK = (
