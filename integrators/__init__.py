@@ -7,7 +7,7 @@ from .conic import ConicSolution, ConicStep, conic_step
 from .driver import drive
 from .history import History, drive_arrays
 from .module_store import module_source
-from .path_file import StrainStressPath, read_path, write_history
+from .path_file import StrainStressPath, read_history, read_path, write_history
 from .sensitivity import Sensitivities
 from .sensitivity_path import PathSensitivities, path_sensitivities
 from .step_order import StepOrder
@@ -37,6 +37,7 @@ __all__ = [
     "drive_arrays",
     "module_source",
     "path_sensitivities",
+    "read_history",
     "read_path",
     "write_history",
 ]

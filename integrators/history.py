@@ -38,6 +38,7 @@ __all__ = ["History", "Plan", "drive_arrays", "path_plan", "time_steps"]
 
 Array = NDArray[np.float64]
 TOLERANCE = 1e-12
+_ARRAYS = ("eps", "sig", "psi", "status", "temperature", "entropy")
 TURNS = 60
 
 
@@ -60,6 +61,19 @@ class History:
     entropy: Array | None = None
     iterations: Array | None = None
 
+    def _joined(self, rest: History) -> History:
+        """The last row of this history, and the rows of another that went on from there."""
+
+        def join(one: Array | None, other: Array | None) -> Array | None:
+            return None if one is None or other is None else np.concatenate([one[-1:], other])
+
+        arrays: dict[str, Any] = {name: join(getattr(self, name), getattr(rest, name)) for name in _ARRAYS}
+        arrays["dissipation"] = np.concatenate([self.dissipation[-1:], self.dissipation[-1] + rest.dissipation])
+        arrays["iterations"] = None if rest.iterations is None else np.concatenate([[0.0], rest.iterations])
+        return History(
+            state={name: np.concatenate([self.state[name][-1:], v]) for name, v in rest.state.items()}, **arrays
+        )
+
     def plot(
         self,
         *,
@@ -71,7 +85,7 @@ class History:
         """A figure of the path; `history.plot().savefig("path.svg")`, and a notebook shows it.
 
         Four panels: stress against strain of one `component` ("11" … "12", of the tensor: shear neither doubled nor Mandel; by default the
-        one that moves most), the equivalent stress against the mean stress, the volume strain, and the energies stored and dissipated
+        one that moves most), the equivalent stress against the mean stress, the volume strain, and the free energy and what was dissipated
         [J/m³] against the length of the strain path. `measure` is "q" for q = √(3 J₂) or "sqrt_J2" for √J₂; `signs` turns the axes
         ("compression-positive"). The first row is an open circle, the last a filled one. Raises `InputError` for a word that is none of
         these.
@@ -112,8 +126,9 @@ def drive_arrays(
     Mandel components. With `trace="eps_v"` or `"p"`, the normal components whose target is NaN share one stress, and their trace
     condition is tr ε = `trace_targets` or −tr σ/3 = `trace_targets` (n,). `tolerance` is relative to the scale of the stress (of the
     strain for an update driven by the stress). An update without tangent (cvxpy, explicit) follows a path that leaves no component unknown.
-    `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference) and are named in
-    messages beside the row; `temperatures` [K], one value or (n,), are for a law that has a temperature.
+    `times` [s] (n,) give the time steps of a viscous law (1 s without them; the first row takes the first difference; (n + 1,) begin with
+    the time of the initial state) and are named in messages beside the row; `temperatures` [K], one value or (n,), are for a law that has
+    a temperature.
     An update for a wanted accuracy is checked in sampled rows.
     Raises `InputError`, or `ConvergenceError` with the row.
     """
@@ -278,7 +293,7 @@ def _run(
         tolerance,
         TURNS,
     )
-    _raise_failure(update, failed, residual, scale, times)
+    _raise_failure(update, failed, residual, scale, times, n)
     psi = update.energies(eps, state, heat.temperature, parameters)
     named = update.unpack(state)
     entropy, _ = thermal_results(update.law, heat, eps, named, values)
@@ -303,7 +318,7 @@ def _run_general(
     failed, residual, scale, found = follow(
         update, plan.base, plan.goal, plan.z, plan.v, start, packed, values, time_steps(times, n), temperatures
     )
-    _raise_failure(update, failed, residual, scale, times)
+    _raise_failure(update, failed, residual, scale, times, n)
     unpacked = update.packing.unpack(found["state"])
     status, turns = np.zeros(n, dtype=np.int64), found["iterations"]
     return History(found["eps"], found["sig"], unpacked, found["psi"], found["dissipation"], status, iterations=turns)
@@ -315,19 +330,24 @@ def _turned(update: Any) -> bool:
 
 
 def time_steps(times: Any, count: int) -> Array:
-    """Differences of the times; the first row, the start of the path, and rows without times count as one unit."""
+    """Differences of the times; the first row, the start of the path, and rows without times count as one unit. With one time more than
+    rows the first is that of the state before the first row."""
     if times is None:
         return np.ones(count)
     steps = np.diff(np.asarray(times, dtype=float))
     if not (np.isfinite(steps).all() and (steps > 0.0).all()):
         raise InputError("drive: the times must increase from row to row")
+    if len(steps) == count > 0:
+        return steps
     return np.concatenate([[float(steps[0]) if steps.size else 1.0], steps])
 
 
-def _raise_failure(update: Any, failed: int, residual: float, scale: float, times: Any) -> None:
+def _raise_failure(update: Any, failed: int, residual: float, scale: float, times: Any, rows: int) -> None:
     if failed < 0:
         return
-    when = "" if times is None else f" (t = {float(times[failed]):g})"
+    when = (
+        "" if times is None else f" (t = {float(times[failed - rows]):g})"
+    )  # from the end: the first may be that of the state before
     if _turned(update):
         what = f"residual {residual:.3g} at strain scale {scale:.3g}"
         remedy = "take smaller steps, or use the strain formulation: stresses at a limit do not tell their strains"

@@ -40,7 +40,7 @@ def history_figure(history: History, *, component: str | None, measure: str, sig
     axis = rf"strain $\varepsilon_{{{COMPONENTS[k]}}}$ [%]" + (f" ({word})" if word else "")
     figure = Figure(figsize=(7.6, 5.8), layout="constrained")
     (curve, path), (volume, energy) = figure.subplots(2, 2)
-    scale, unit = unit_scale(float(np.abs(stress).max()))
+    scale, unit = unit_scale(_largest(stress))
     _walk(curve, strain, scale * stress)
     curve.set(xlabel=axis, ylabel=rf"stress $\sigma_{{{COMPONENTS[k]}}}$ [{unit}]", title="Stress and strain")
     _stress_path(path, history.sig, measure, turned)
@@ -67,6 +67,12 @@ def _plain(array: Array, k: int) -> Array:
     return array[:, k] if k < 3 else array[:, k] / np.sqrt(2.0)
 
 
+def _largest(*arrays: Array) -> float:
+    """The largest size that is finite."""
+    sizes = np.abs(np.concatenate(arrays))
+    return float(sizes[np.isfinite(sizes)].max(initial=0.0))
+
+
 def _walk(ax: Any, x: Array, y: Array) -> None:
     """A curve with its beginning (open) and its end (filled)."""
     ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=1)
@@ -82,7 +88,7 @@ def _stress_path(ax: Any, sig: Array, measure: str, turned: Signs) -> None:
     deviator = sig.copy()
     deviator[:, :3] -= mean[:, None]
     equivalent = size * np.linalg.norm(deviator, axis=1) / np.sqrt(2.0)
-    scale, unit = unit_scale(max(float(np.abs(mean).max()), float(equivalent.max())))
+    scale, unit = unit_scale(_largest(mean, equivalent))
     _walk(ax, scale * turned.factor * mean, scale * equivalent)
     label = r"mean stress $\mathrm{tr}\,\sigma/3$" if turned.factor > 0 else r"mean pressure $p=-\mathrm{tr}\,\sigma/3$"
     ax.set(xlabel=f"{label} [{unit}]", ylabel=f"equivalent stress {name} [{unit}]", title="Path of the stress")
@@ -92,9 +98,9 @@ def _energies(ax: Any, history: History) -> None:
     steps = np.diff(history.eps, axis=0, prepend=history.eps[:1])
     walked = 100.0 * np.cumsum(np.linalg.norm(steps, axis=1))
     stored, lost = np.asarray(history.psi), np.asarray(history.dissipation)
-    scale, unit = unit_scale(float(np.abs(np.concatenate([stored, lost])).max()), "J/m³")
+    scale, unit = unit_scale(_largest(stored, lost), "J/m³")
     ax.axhline(0.0, color=FAINT, linewidth=0.8, zorder=1)
-    ax.plot(walked, scale * stored, color=GREEN, label=r"stored, $\rho\psi$")
+    ax.plot(walked, scale * stored, color=GREEN, label=r"free energy $\rho\psi$")
     ax.plot(walked, scale * lost, color=VERMILION, linestyle="--", label="dissipated since the start")
     ax.set(
         xlabel=r"strain walked, $\int\Vert\mathrm{d}\varepsilon\Vert$ [%]", ylabel=f"energy [{unit}]", title="Energies"

@@ -20,9 +20,10 @@ import numpy as np
 from ..drawing import Signs
 from ..errors import InputError, StorageError
 from ..notebook import Summary
+from ..potentials import Law
 from .history import History
 
-__all__ = ["COMPONENTS", "StrainStressPath", "read_path", "write_history"]
+__all__ = ["COMPONENTS", "StrainStressPath", "read_history", "read_path", "write_history"]
 
 COMPONENTS = ("xx", "yy", "zz", "yz", "xz", "xy")
 MANDEL = np.array([1.0, 1.0, 1.0, math.sqrt(2.0), math.sqrt(2.0), math.sqrt(2.0)])
@@ -50,11 +51,12 @@ class StrainStressPath(Summary):
         return f"a path of {len(self.time)} rows"
 
 
-def read_path(file: str | Path, *, signs: str = "tension-positive") -> StrainStressPath:
+def read_path(file: str | Path, *, signs: str = "tension-positive", virgin: bool = True) -> StrainStressPath:
     """Read `PATH.csv`, whose strains and stresses are written under `signs`; what is returned is tension positive.
 
     With "compression-positive" every tensor component and `eps_v` turn; the mean pressure `p` is positive in compression under either.
-    `InputError` names the file, the row (header is row 1) and the column.
+    The first row is the virgin state, all zero; with `virgin` False it is the end of another path, whose stresses stand in it, and
+    only strains are zero there (see `drive`). `InputError` names the file, the row (header is row 1) and the column.
     """
     factor = Signs(signs).factor
     path = Path(file)
@@ -75,9 +77,14 @@ def read_path(file: str | Path, *, signs: str = "tension-positive") -> StrainStr
     table = np.array([_numbers(path, number, header, row) for number, row in rows[1:]])
     first = rows[1][0]
     for name, value in zip(header, table[0], strict=True):
-        if name not in ("t", "T") and value != 0.0:
+        if name not in ("t", "T") and value != 0.0 and (virgin or name.startswith("eps_")):
+            state = (
+                "the virgin state and must be zero"
+                if virgin
+                else "where the path begins; strains count from there and must be zero"
+            )
             raise InputError(
-                f"path file '{path}', row {first}, column '{name}': the first row is the virgin state and must be zero, not {value:g}"
+                f"path file '{path}', row {first}, column '{name}': the first row is {state}, not {value:g}"
             )
     time = table[:, header.index("t")]
     if "T" in header and not (table[:, header.index("T")] > 0.0).all():
@@ -108,7 +115,7 @@ def _check_header(path: Path, header: list[str]) -> None:
         if f"eps_{c}" in header and f"sig_{c}" in header:
             raise InputError(
                 f"{where}: both 'eps_{c}' and 'sig_{c}' are given; prescribe one of them, the same for the whole path "
-                "(drive_arrays goes on from a state under another control)"
+                "(a second path goes on from its end under another control: drive --after)"
             )
     if "eps_v" in header and "p" in header:
         raise InputError(f"{where}: both 'eps_v' and 'p' are given; one of them may replace one component")
@@ -168,6 +175,47 @@ def write_history(file: str | Path, history: History, time: Any = None, *, signs
         raise StorageError(f"cannot write '{file}': {error.strerror}") from None
 
 
+def read_history(file: str | Path, law: Law, *, signs: str = "tension-positive") -> History:
+    """Read an `OUT.csv` that `write_history` or `fenchel drive -o` wrote for a law, tension positive again; to go on from it, see `drive`.
+
+    `InputError` for a file that cannot be read, that is no history of this law, or that holds a step that has not converged.
+    """
+    factor = Signs(signs).factor
+    path = Path(file)
+    try:
+        rows = [row for row in csv.reader(path.read_text(encoding="utf-8-sig").splitlines()) if row]
+    except (OSError, UnicodeDecodeError) as error:
+        reason = error.strerror if isinstance(error, OSError) else "it is not text"
+        raise InputError(f"history '{path}' cannot be read: {reason}") from None
+    try:
+        table = np.array([[float(cell) for cell in row] for row in rows[1:]])
+        columns = dict(zip(rows[0], table.T, strict=True))
+
+        def tensor(name: str) -> np.ndarray:
+            return (
+                factor * np.stack([columns[f"{name}_{c}"] * MANDEL[i] for i, c in enumerate(COMPONENTS)], axis=1) + 0.0
+            )
+
+        state = {}
+        for variable in law.internal:
+            name = variable.name
+            if f"{name}_xx" in columns:
+                state[name] = tensor(name)
+            else:
+                state[name] = columns[f"internal_{name}"] if f"internal_{name}" in columns else columns[name]
+        found = History(
+            tensor("eps"), tensor("sig"), state, columns["psi"], columns["dissipation"], columns["status"].astype(np.int64),
+            columns.get("T"), columns.get("entropy"),
+        )  # fmt: skip
+    except (ValueError, IndexError, KeyError) as problem:
+        raise InputError(
+            f"'{path}' is no history of law '{law.name}' ({problem}): give what fenchel drive -o wrote for it"
+        ) from None
+    if not all(np.isfinite(array).all() for array in (found.eps, found.sig, *state.values())) or found.status.any():
+        raise InputError(f"history '{path}' holds a step that has not converged: nothing can go on from it")
+    return found
+
+
 def history_columns(history: History, time: Any = None, signs: str = "tension-positive") -> dict[str, np.ndarray]:
     """Columns of `OUT.csv` by name, under `signs`."""
     factor = Signs(signs).factor
@@ -196,5 +244,6 @@ def history_columns(history: History, time: Any = None, signs: str = "tension-po
     found = columns | ends
     if factor > 0.0:
         return found
-    turning = tuple(f"_{c}" for c in COMPONENTS)
-    return {name: 0.0 - v if name.endswith(turning) or name == "eps_v" else v for name, v in found.items()}
+    tensors = ("eps", "sig", *(name for name, values in history.state.items() if values.ndim == 2))
+    turning = {"eps_v", *(f"{name}_{c}" for name in tensors for c in COMPONENTS)}
+    return {name: 0.0 - v if name in turning else v for name, v in found.items()}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import importlib
 import math
 import re
+import sys
 import textwrap
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -103,7 +104,7 @@ def page(name: str, entry: Entry) -> str:
     """The page of one law, as a notebook in Markdown."""
     law = entry.law
     text = importlib.import_module(f"fenchel.potentials.library._{name}").__doc__ or ""
-    words = " ".join(f"-p {key}={value:g}" for key, value in entry.values.items())
+    words = " ".join(f"-p {key}={value!r}" for key, value in entry.values.items())
     return "\n".join(
         [
             HEAD,
@@ -122,6 +123,7 @@ def page(name: str, entry: Entry) -> str:
             "",
             *parameters(entry),
             CELLS.format(name=name, known=known(entry), state=STATE if entry.worked.state else "", words=words),
+            "The path of a law with a temperature has a column `T` [K]." if law.temperature is not None else "",
         ]
     )
 
@@ -205,6 +207,7 @@ class LawList(SphinxDirective):
     """Every law of the library with its line, each a link to its page, in the order of the registry."""
 
     def run(self) -> list[nodes.Node]:
+        self.env.note_dependency(str(Path(str(sys.modules["fenchel.potentials.library"].__file__))))
         lines = ["| law | what it is | source |", "|---|---|---|"]
         for name, entry in ENTRIES.items():
             lines.append(f"| [`{name}`](laws/{name}.md) | {escaped(entry.law.note)} | {escaped(entry.source)} |")

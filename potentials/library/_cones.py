@@ -11,6 +11,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from sympy import Expr, asin, atan, cos, sin, sqrt, sympify, tan
@@ -20,6 +21,7 @@ from ...errors import InputError
 __all__ = ["cone", "cone_values", "rescaled_pseudo_norm", "triaxial_friction"]
 
 READINGS = ("shear_limit", "sine", "compression", "extension", "plane_strain")
+STEEPEST = math.pi / 3 * (1 - 1e-12)  # slope √3 of √J₂ over the mean pressure: φ would be 90°
 FORMS = {"sqrt_J2": 1, "norm": sqrt(2), "q": sqrt(3)}
 
 
@@ -69,9 +71,10 @@ def triaxial_friction(theta_f: Any, C_0: Any) -> dict[str, Any]:
     >>> {name: round(x, 6) for name, x in triaxial_friction(*cone_values(*cone(0.6, 5.0, "compression")).values()).items()}
     {'phi': 0.6, 'c': 5.0}
     """
-    t = tan(sympify(theta_f, strict=True))
+    angle = sympify(theta_f, strict=True)
+    t = tan(angle)
     sine = sqrt(3) * t / (2 + t / sqrt(3))
-    if sine.is_number and not 0 <= float(sine) < 1:
+    if angle.is_number and not 0 <= float(angle) < STEEPEST:
         raise InputError(
             f"theta_f = {theta_f}: no friction angle of Mohr–Coulomb has this strength in compression; it needs 0 to 60°"
         )

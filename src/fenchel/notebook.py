@@ -121,6 +121,8 @@ def field_cells(name: str, unit: str, value: Any) -> tuple[str, str, str, str]:
     >>> field_cells("pressure", "Pa", 2e4), field_cells("quality", "", {"drift": 1e-9, "angle": 2.0})
     (('pressure', 'Pa', '', '20000'), ('quality', '', '2 entries', 'drift, angle'))
     """
+    if hasattr(value, "dtype") and hasattr(value, "item") and getattr(value, "ndim", None) == 0:
+        value = value.item()
     if isinstance(value, bool) or value is None:
         return name, unit, "", str(value).lower()
     if isinstance(value, (int, float)):
@@ -130,12 +132,18 @@ def field_cells(name: str, unit: str, value: Any) -> tuple[str, str, str, str]:
     if isinstance(value, (tuple, list)) and not all(isinstance(x, (int, float)) for x in value):
         kinds = list(dict.fromkeys(x if isinstance(x, str) else type(x).__name__ for x in value))
         return name, unit, _entries(len(value)), _shortened(", ".join(kinds))
+    if hasattr(value, "dtype") and value.dtype.kind not in "fiub":
+        return name, unit, " × ".join(map(str, value.shape)), str(value.dtype)
     if hasattr(value, "dtype") or isinstance(value, (tuple, list)):
         cells = array_cells(name, unit, value)
         few = getattr(value, "ndim", 1) == 1 and 0 < len(value) <= FEW
         return (*cells[:3], ", ".join(f"{float(x):.6g}" for x in value)) if few else cells
     title = getattr(value, "_title", None)
-    return name, unit, "", _shortened(title() if callable(title) else str(value).splitlines()[0])
+    if callable(title):
+        return name, unit, "", _shortened(title())
+    if dataclasses.is_dataclass(value):
+        return name, unit, "", type(value).__name__
+    return name, unit, "", _shortened((str(value).splitlines() or [""])[0])
 
 
 def _entries(count: int) -> str:

@@ -6,6 +6,7 @@ import re
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,8 @@ import pytest
 from fenchel import cli
 from fenchel.cli import tables
 from fenchel.errors import InputError
-from fenchel.integrators import drive, read_path, write_history
+from fenchel.integrators import StrainStressPath, drive, read_path, write_history
+from fenchel.integrators.path_file import history_columns
 from fenchel.potentials import Law, parameters
 from fenchel.potentials.library import ENTRIES, LAWS
 
@@ -164,16 +166,79 @@ def test_ctrl_c_says_what_is_kept(tmp_path):
         "seed = 4\n[grains]\ncount = 3000\nfriction = 0.35\nnormal_stiffness = 4.3e4\n[triaxial]\nstrain_path = [0.0, -2e-1]\n"
     )
     script = (
-        "import sys, threading, _thread, signal, os, time\n"
-        "threading.Thread(target=lambda: (time.sleep(12), os.kill(os.getpid(), signal.SIGINT)), daemon=True).start()\n"
+        "import sys, threading, signal, os, time\n"
+        "def press():\n"
+        "    while not os.path.exists('run.h5'):\n"
+        "        time.sleep(0.1)\n"
+        "    os.kill(os.getpid(), signal.SIGINT)\n"
+        "threading.Thread(target=press, daemon=True).start()\n"
         "from fenchel.cli import main\n"
         "sys.exit(main(['dem', 'scene.toml', '-o', 'run.h5', '--quiet']))\n"
     )
     done = subprocess.run([sys.executable, "-c", script], cwd=tmp_path, capture_output=True, text=True, timeout=240)
     assert done.returncode == 128 + signal.SIGINT
     assert (
-        done.stdout == "" and "the same command with --resume goes on" in done.stderr and done.stderr.count("\n") == 1
+        done.stdout == ""
+        and "the same command with --resume goes on" in done.stderr
+        and (tmp_path / "run.h5").exists()
+        and done.stderr.count("\n") == 1
     )
+
+
+def test_ctrl_c_without_arguments(capsys, monkeypatch):
+    def pressed(**_):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(cli, "app", pressed)
+    for words in ([], ["--version"], ["identify", "x.csv"]):
+        assert cli.main(words) == 130
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize("width", [10, 20, 40])
+def test_a_number_wider_than_the_terminal_is_whole(capsys, monkeypatch, width):
+    monkeypatch.setattr(tables, "_WIDTH_OF_A_FILE", width)
+    tables.print_table(("a", "b", "c"), [(1.23456e-100, -2.34567e-100, "words that are folded, many of them")])
+    assert {"1.23456e-100", "-2.34567e-100"} <= set(capsys.readouterr().out.split())
+    tables.print_table(("only",), [(-1.23456e-100,)])
+    tables.print_table(("a", "b"), [])
+    assert "-1.23456e-100" in capsys.readouterr().out
+
+
+def test_brackets_in_heads_and_titles_are_text(capsys):
+    tables.print_table(("cost [s per point]", "cost [s]"), [(1.0, 2.0)], title="out/[run].h5 [/x]")
+    out = capsys.readouterr().out
+    assert "cost [s per point]" in out and "cost [s] " in out and "out/[run].h5 [/x]" in out
+
+
+def test_figure_and_history_have_names_of_their_own(path, capsys):
+    file = path.parent / "out.svg"
+    assert "give the figure another name" in refused(
+        capsys, "drive", "von_mises", path, *STEEL, "-o", file, "--plot", file
+    )
+    assert not file.exists()
+
+
+def test_a_shear_strain_is_told_as_it_was_written(tmp_path, capsys):
+    (tmp_path / "path.csv").write_text("t,eps_xy\n0,0\n1,0.4\n")
+    assert cli.main(["drive", "von_mises", str(tmp_path / "path.csv"), *STEEL]) == 0
+    assert capsys.readouterr().err == ""
+    (tmp_path / "path.csv").write_text("t,eps_xy\n0,0\n1,0.6\n")
+    assert cli.main(["drive", "von_mises", str(tmp_path / "path.csv"), *STEEL]) == 0
+    assert "the strain reaches 0.6, that is 60%" in capsys.readouterr().err
+
+
+def test_a_scalar_does_not_turn_whatever_its_name(tmp_path):
+    history = drive(LAWS["von_mises"], _plan(), dict(E=2e11, nu=0.3, sigma_y=2e8, H_k=0.0, H_i=1e9))
+    found = history_columns(replace(history, state={"wear_zz": np.array([0.0, 2.0])}), None, "compression-positive")
+    np.testing.assert_array_equal(found["wear_zz"], [0.0, 2.0])
+    np.testing.assert_array_equal(found["eps_zz"], [0.0, -1e-3])
+
+
+def _plan():
+    targets = np.zeros((2, 6))
+    targets[1, 2] = 1e-3
+    return StrainStressPath(np.array([0.0, 1.0]), np.array([True, True, False, True, True, True]), targets)
 
 
 def test_every_line_of_the_help_is_whole(capsys):
@@ -194,7 +259,7 @@ def test_what_takes_long_says_so(capfd, monkeypatch):
         pass
     time.sleep(0.2)
     err = capfd.readouterr().err
-    assert err.count("\n") == 1 and err.startswith("driving law 'soil': ") and "compiled" in err
+    assert err.count("\n") == 1 and err.startswith("driving law 'soil' ...") and "compiled" in err
 
 
 def test_a_law_of_a_readme_is_guarded_against_degrees():

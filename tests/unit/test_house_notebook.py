@@ -20,7 +20,7 @@ from fenchel.identify.estimate_view import estimate_figure, estimate_rows
 from fenchel.integrators import StepResult
 from fenchel.integrators.comparison import Comparison, Run
 from fenchel.integrators.history import History
-from fenchel.notebook import Summary
+from fenchel.notebook import Summary, field_cells
 from fenchel.potentials import total_conjugate
 from fenchel.potentials.library import LAWS
 
@@ -210,6 +210,25 @@ def test_a_tensor_is_listed_and_what_is_missing_is_left_out():
     assert ["inner", "", "", "Thing"] in rows and all(row[0] != "none" for row in rows)
 
 
+@pytest.mark.parametrize(
+    ("value", "cells"),
+    [
+        ("", ("", "")),
+        (np.array(["a", "b"]), ("2", "<U1")),
+        (np.array([1 + 2j]), ("1", "complex128")),
+        (np.array([object()]), ("1", "object")),
+        (np.True_, ("", "true")),
+        (np.float64(2.5), ("", "2.5")),
+        (np.array(3), ("", "3")),
+        (np.zeros((0, 6)), ("0 × 6", "")),
+        ((), ("0", "")),
+        (Front(kind="law", subject="s", measure="m", cost="s", points=()), ("", "Front")),
+    ],
+)
+def test_anything_that_a_result_may_hold_has_cells(value, cells):
+    assert field_cells("x", "Pa", value)[2:] == cells
+
+
 def test_a_step_says_what_it_is():
     for solver, text in (("auto", "solver 'closed' ("), ("general", "solver 'general' (asked for by name)")):
         step_of = LAWS["von_mises"].compile("3d", solver=solver)
@@ -225,6 +244,10 @@ def test_estimates_are_a_table_and_a_figure():
                         seed_deviation=1.0, octant_deviation=1.0),
         "H_k": Estimate(name="H_k", unit="Pa", value=-1e5, low=-9e5, high=7e5, source="octants", seed_values=(-1e5,),
                         seed_deviation=np.nan, octant_deviation=1e5),
+        "E_w": Estimate(name="E_w", unit="Pa", value=1.0, low=5.0, high=6.0, source="seeds", seed_values=(50.0,),
+                        seed_deviation=1.0, octant_deviation=1.0),
+        "H_i": Estimate(name="H_i", unit="Pa", value=1.0, low=0.5, high=np.inf, source="seeds", seed_values=(1.0,),
+                        seed_deviation=1.0, octant_deviation=1.0),
         "nu": Estimate(name="nu", unit="1", value=0.2, low=np.nan, high=np.nan, source="none", seed_values=(0.2,),
                        seed_deviation=np.nan, octant_deviation=np.nan),
     }  # fmt: skip
@@ -232,6 +255,8 @@ def test_estimates_are_a_table_and_a_figure():
         ("E_s", "Pa", "1.2e+07", "1e+07 … 1.4e+07"),
         ("C_0", "Pa", "0", "-1 … 1"),
         ("H_k", "Pa", "-100000", "-9e+05 … 7e+05"),
+        ("E_w", "Pa", "1", "5 … 6"),
+        ("H_i", "Pa", "1", "none"),
         ("nu", "1", "0.2", "none"),
     ]
     figure = estimate_figure(told)
@@ -240,8 +265,17 @@ def test_estimates_are_a_table_and_a_figure():
     np.testing.assert_allclose(bars[0], [1.0 / 1.2, 1.4 / 1.2], rtol=1e-12)
     low, high = axis.get_xlim()
     np.testing.assert_allclose(bars[2], [low, high], rtol=1e-12)  # −7 to 9 times the value: cut, with arrows
-    assert sorted(bars) == [0, 2]
+    np.testing.assert_allclose(
+        bars[3], [high, high], rtol=1e-12
+    )  # wholly beyond the axis: both of its ends are at the edge
+    assert sorted(bars) == [0, 2, 3]
+    assert all(
+        low - 1e-12 <= x <= high + 1e-12
+        for line in axis.get_lines()
+        for x in line.get_xdata()
+        if len(line.get_xdata()) < 3
+    )
     assert {line.get_marker() for line in axis.get_lines() if line.get_ydata()[0] == 2} >= {"<", ">"}
     shown(figure)
     said = assert_words_apart(figure, 8)
-    assert any("no interval" in word for word in said) and any("-1e+05 Pa" in word for word in said)
+    assert sum("no interval" in word for word in said) == 2 and any("-1e+05 Pa" in word for word in said)

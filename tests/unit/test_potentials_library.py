@@ -83,7 +83,7 @@ def test_the_friction_of_a_triaxial_test_is_that_of_the_stresses_at_first_yield(
 
 
 def test_a_cone_too_steep_for_a_friction_angle_is_refused():
-    for theta_f in (1.05, 1.5, -0.1):
+    for theta_f in (np.pi / 3, 1.05, 1.5, 3.3, -0.1):
         with pytest.raises(InputError, match="it needs 0 to 60°"):
             triaxial_friction(theta_f, 1e3)
 

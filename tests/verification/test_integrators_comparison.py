@@ -260,7 +260,7 @@ def test_sampled_rows_are_spread_and_hold_the_last():
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        (dict(given={"E": 1e9}), "has no value"),
+        (dict(given={"E": 1e9}), "no value; give"),
         (dict(tolerance=0.0), "tolerance"),
         (dict(parts=(1, 3)), "parts"),
         (dict(sampled_rows=0), "rows"),

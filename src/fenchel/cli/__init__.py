@@ -26,9 +26,9 @@ app = typer.Typer(
 
 STOPPED = 130
 _KEPT = {
-    "dem": "the run file holds its last checkpoint: the same command with --resume goes on from there",
-    "identify": "finished runs and checkpoints are kept: the same command goes on from there",
-    "reproduce": "finished runs and checkpoints are kept: the same command goes on from there",
+    "dem": "if the run file is there it holds the last checkpoint, and the same command with --resume goes on from it",
+    "identify": "runs and checkpoints of a study are kept, and the same command goes on from them",
+    "reproduce": "runs and checkpoints are kept, and the same command goes on from them",
 }
 
 
@@ -58,14 +58,16 @@ for _group in (laws, drive, compare, dem, contact, identify, reproduce, tradeoff
 
 def main(arguments: list[str] | None = None) -> int:
     """Run the command line on `arguments` (default: those of the process) and return its exit code."""
-    given = sys.argv[1:] if arguments is None else arguments
+    given = (sys.argv[1:] if arguments is None else arguments) or ["--help"]
+    told = False
     try:
-        code = app(args=given or ["--help"], prog_name="fenchel", standalone_mode=False)
+        code = app(args=given, prog_name="fenchel", standalone_mode=False)
     except Exception as problem:
         line, code = one_line(problem)
         print(line, file=sys.stderr)
+        told = True
     except KeyboardInterrupt:
         code = STOPPED
-    if code == STOPPED:  # typer turns Ctrl-C into this code and says nothing
+    if code == STOPPED and not told:  # typer turns Ctrl-C into this code and says nothing
         print(f"fenchel: stopped; {_KEPT.get(given[0], 'nothing was written in part')}", file=sys.stderr)
     return code if isinstance(code, int) else 0

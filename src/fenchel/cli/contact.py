@@ -55,8 +55,10 @@ def _contact(
     notes = []
     if not given.symmetric:
         notes.append(f"W is not symmetric (relative part {given.asymmetry:.1e}): the problem was solved as given")
-    with waiting("certifying by a cone program"):
-        certified, how = _certified(given, solution.r) if certify else (None, "")
+    certified, how = None, ""
+    if certify:
+        with waiting("certifying by a cone program"):
+            certified, how = _certified(given, solution.r)
     if how:
         notes.append(how)
     if not solution.converged:

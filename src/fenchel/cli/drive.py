@@ -60,6 +60,12 @@ def _drive(
         metavar="FILE.png|svg",
         help="Draw stress and strain, the path of the stress, volume and energies.",
     ),
+    after: Path | None = typer.Option(
+        None,
+        "--after",
+        metavar="OUT.csv",
+        help="Go on from the end of a history that -o wrote: its stresses stand in the first row of PATH.csv, strains count from there.",
+    ),
     signs: Signs = SIGNS,
     certify: bool = typer.Option(False, "--certify", help="Add the duality gap of every step [J/m3]."),
     json_wanted: bool = typer.Option(False, "--json", help="Print the history as JSON."),
@@ -78,10 +84,14 @@ def _drive(
 
     Example: fenchel drive von_mises path.csv -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_k=0 -p H_i=1e9 -o out.csv
 
+    Consolidated, then sheared: the shearing goes on, under another control, from where the consolidation ended.
+
+    Example: fenchel drive sand shear.csv --parameters sand.toml --after consolidation.out.csv -o shear.out.csv
+
     Example: fenchel drive sand path.csv --parameters sand.toml --signs compression-positive --plot path.png
     """
     from fenchel.errors import InputError
-    from fenchel.integrators import drive, read_path
+    from fenchel.integrators import drive, read_history, read_path
     from fenchel.integrators.path_file import history_columns
     from fenchel.potentials import load_law
 
@@ -89,28 +99,37 @@ def _drive(
 
     if plot is not None:
         figure_kind(plot)
+        if output is not None and output.resolve() == plot.resolve():
+            raise InputError(f"-o and --plot both name {plot}: give the figure another name")
     values = parameter_values(pairs, parameters)
-    plan = read_path(path, signs=signs.value)
     declared = load_law(law)
+    plan = read_path(path, signs=signs.value, virgin=after is None)
+    before = None if after is None else read_history(after, declared, signs=signs.value)
+    if certify and after is not None:
+        raise InputError("--certify bounds a path from the virgin state: leave --certify or --after out")
     if certify and solver is Solver.explicit:
         raise InputError(
             "--certify: an explicit step is not the minimum of a program and has no gap: leave --certify out"
         )
     for file in (output, plot):
-        if file is not None and file.exists() and file.samefile(path):
-            raise InputError(f"{file} is the path itself: give the history another name")
+        for given in (path, after):
+            if file is not None and given is not None and file.exists() and file.samefile(given):
+                raise InputError(
+                    f"{file} is the {'path' if given is path else 'history before'} itself: give the history another name"
+                )
+    declared.values(values)  # refused before anything is compiled
     with waiting(f"driving law '{declared.name}'"):
         update = declared.compile("3d", formulation=formulation.value, solver=solver.value)
-        history = drive(update, plan, values)
+        history = drive(update, plan, values, after=before)
         columns: dict[str, Any] = dict(history_columns(history, plan.time, signs.value))
         if certify:
             columns["gap"] = _gaps(declared, history, values, plan.time, plan.temperature)
     _warn_of_size(path, history)
+    if output is not None:
+        write_text(output, csv_text(columns))
     if plot is not None:
         write_figure(history.plot(signs=signs.value, title=declared.name), plot)
         typer.echo(f"figure in {plot}", err=True)
-    if output is not None:
-        write_text(output, csv_text(columns))
     if json_wanted:
         print_json(columns)
     elif output is not None:
@@ -126,7 +145,9 @@ def _drive(
 
 def _warn_of_size(path: Path, history: History) -> None:
     """A line on standard error where strains are so large that they were probably meant in per cent."""
-    largest = float(abs(history.eps).max())
+    from fenchel.integrators.path_file import MANDEL
+
+    largest = float(abs(history.eps / MANDEL).max())
     if largest > LARGE:
         typer.echo(
             f"fenchel: {path}: the strain reaches {largest:.3g}, that is {largest:.0%}: strains are fractions, not per cent, and laws are "

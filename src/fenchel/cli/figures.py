@@ -15,7 +15,7 @@ def figure_kind(file: Path) -> str:
     kind = file.suffix.lower().removeprefix(".")
     if kind not in ("png", "svg"):
         raise InputError(
-            f"--plot {file}: the figure is written as .png or .svg: write --plot {file.stem or 'figure'}.png"
+            f"--plot {file}: the figure is written as .png or .svg: write --plot {file.stem.strip('-.') or 'figure'}.png"
         )
     return kind
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from enum import StrEnum
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import typer
 
@@ -12,9 +11,6 @@ from .figures import figure_kind, write_figure
 from .progress import waiting
 from .signs import SIGNS, Signs
 from .values import PARAMETERS, VALUES, parameter_values
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["LAW", "Formulation", "Split", "register"]
 

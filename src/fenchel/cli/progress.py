@@ -95,8 +95,8 @@ def notice() -> Iterator[Callable[[float, str], None]]:
 
 @contextmanager
 def waiting(what: str) -> Iterator[None]:
-    """Says on standard error what takes so long, once, if it does: a law or a solver that is new is compiled first."""
-    line = f"{what}: code that is new is compiled first, once, and kept (fenchel doctor says where) ..."
+    """Says on standard error what is going on, once, if it takes long."""
+    line = f"{what} ... (where its code is new it is compiled first, and kept for the next time)"
     timer = threading.Timer(_PATIENCE[sys.stderr.isatty()], lambda: print(line, file=sys.stderr, flush=True))
     timer.daemon = True
     timer.start()

@@ -12,6 +12,7 @@ from typing import Any
 __all__ = ["csv_text", "number", "print_json", "print_table"]
 
 _WIDTH_OF_A_FILE = 140
+_GAP = 3  # between columns, as rich sets it
 _WORDS = 16  # room that a column of words asks for; they are folded
 
 
@@ -37,10 +38,16 @@ def print_table(columns: Sequence[str], rows: Iterable[Sequence[object]], *, tit
     broken = [any(not isinstance(row[k], (int, float)) for row in body) for k in range(len(columns))]
     longest = [max(len(head), *(len(row[k]) for row in cells), 0) for k, head in enumerate(columns)]
     widths = [min(longest[k], max(_WORDS, len(head))) if broken[k] else longest[k] for k, head in enumerate(columns)]
-    for n, group in enumerate(_groups(widths, console.width)):
-        table = Table(title=title if n == 0 else None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    groups = _groups(widths, console.width)
+    # a terminal narrower than two numbers wraps the line itself; a table would cut a number short
+    needed = max((sum(widths[k] + _GAP for k in group) for group in groups), default=0)
+    console = Console(width=max(console.width, needed))
+    for n, group in enumerate(groups):
+        table = Table(
+            title=Text(title) if title and n == 0 else None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False
+        )
         for k in group:
-            table.add_column(columns[k], overflow="fold", no_wrap=not broken[k])
+            table.add_column(Text(columns[k]), overflow="fold", no_wrap=not broken[k])
         for row in cells:
             table.add_row(*(Text(row[k]) for k in group))
         console.print(table)
@@ -52,11 +59,10 @@ def _groups(widths: Sequence[int], room: int) -> list[list[int]]:
     >>> _groups([4, 30, 30, 30], 80), _groups([4, 30], 20)
     ([[0, 1, 2], [0, 3]], [[0, 1]])
     """
-    gap, edge = 3, 2  # as rich sets them
     groups: list[list[int]] = [[0]] if widths else []
     for k in range(1, len(widths)):
-        taken = sum(widths[j] + gap for j in groups[-1])
-        if len(groups[-1]) > 1 and taken + widths[k] + edge > room:
+        taken = sum(widths[j] + _GAP for j in groups[-1])
+        if len(groups[-1]) > 1 and taken + widths[k] + _GAP > room:
             groups.append([0])
         groups[-1].append(k)
     return groups

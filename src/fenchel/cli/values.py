@@ -40,8 +40,8 @@ def _meant(name: str, text: str) -> str:
     comma = text.strip().replace(",", ".")
     if text.count(",") == 1 and _is_number(comma):
         return f": write -p {name}={comma}"
-    digits = re.match(r"\s*[-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?", text)
-    if digits and _is_number(digits.group()):
+    unit = re.fullmatch(r"\s*([-+]?[0-9.]+(?:[eE][-+]?[0-9]+)?)\s*[a-zA-Zµ°%][a-zA-Z0-9/.^]*\s*", text)
+    if unit and _is_number(unit.group(1)) and not text.strip().startswith("0x"):
         return ": give the value in SI units without a unit, as in 200e9 for 200 GPa"
     return ""
 

@@ -27,7 +27,7 @@ def estimate_rows(estimates: Mapping[str, Any]) -> list[tuple[str, ...]]:
 def estimate_figure(estimates: Mapping[str, Any]) -> Any:
     """Every estimate over its own value, one line each: the interval as a bar, the values of the single samples as rings.
 
-    A value of zero has no such picture and stands as words; what reaches beyond the axis ends in an arrow.
+    A value of zero has no such picture and stands as words; a bar that reaches beyond the axis ends in an arrow, a ring stands on its edge.
     """
     from matplotlib.figure import Figure
 
@@ -41,15 +41,18 @@ def estimate_figure(estimates: Mapping[str, Any]) -> Any:
             reach = max(reach, *ends) if ends else reach
     reach = min(1.1 * reach, WIDEST)
     for k, e in enumerate(shown):
-        if e.value and isfinite(e.low) and isfinite(e.high):
+        bounded = isfinite(e.low) and isfinite(e.high)
+        if e.value and bounded:
             _bar(axis, k, *sorted((e.low / e.value, e.high / e.value)), reach)
         if e.value:
-            seeds = [x / e.value for x in getattr(e, "seed_values", ()) if abs(x / e.value - 1.0) <= reach]
+            single = [
+                min(max(x / e.value, 1.0 - reach), 1.0 + reach) for x in getattr(e, "seed_values", ()) if isfinite(x)
+            ]
             axis.plot(
-                seeds, [k] * len(seeds), "o", markersize=5.0, markerfacecolor="none", color=VERMILION, linestyle=""
+                single, [k] * len(single), "o", markersize=5.0, markerfacecolor="none", color=VERMILION, clip_on=False
             )
             axis.plot(1.0, k, "o", markersize=4.0, color=INK)
-        words = "" if isfinite(e.low) else "  no interval"
+        words = "" if bounded else "  no interval"
         axis.text(
             1.0 + 1.04 * reach, k, f"{e.value:.4g} {'' if e.unit == '1' else e.unit}{words}", va="center", fontsize=8.0
         )
@@ -62,7 +65,9 @@ def estimate_figure(estimates: Mapping[str, Any]) -> Any:
 
 
 def _bar(axis: Any, k: int, low: float, high: float, reach: float) -> None:
-    ends = (max(low, 1.0 - reach), min(high, 1.0 + reach))
+    first, last = 1.0 - reach, 1.0 + reach
+    ends = (min(max(low, first), last), min(max(high, first), last))
     axis.plot(ends, (k, k), color=BLUE, linewidth=2.0, solid_capstyle="butt", zorder=2)
-    for end, cut, mark in ((ends[0], low < ends[0], "<"), (ends[1], high > ends[1], ">")):
-        axis.plot(end, k, mark if cut else "|", markersize=6.0, color=BLUE, clip_on=False, zorder=3)
+    for end, bound in zip(ends, (low, high), strict=True):
+        mark = "<" if bound < first else ">" if bound > last else "|"
+        axis.plot(end, k, mark, markersize=6.0, color=BLUE, clip_on=False, zorder=3)

@@ -71,10 +71,12 @@ def _check_folder(folder: Path, names: list[str]) -> None:
     report = folder / "report.json"
     try:
         content = json.loads(report.read_text(encoding="utf-8"))
-        there = sorted(test["name"] for test in content["tests"])
-    except FileNotFoundError:
+        there = sorted(str(test["name"]) for test in content["tests"])
+    except (FileNotFoundError, NotADirectoryError):
         return
-    except (OSError, ValueError, KeyError, TypeError):
+    except OSError as problem:
+        raise InputError(f"{report}: cannot be read ({problem.strerror}): choose another folder") from None
+    except (ValueError, KeyError, TypeError, RecursionError):
         there = []
     if there != sorted(names):
         raise InputError(

@@ -79,7 +79,9 @@ class LaboratoryFit(Summary):
         return shown(path_figure(self, Signs(signs)))
 
     def plot_intervals(self) -> Any:
-        """A matplotlib figure: the fitted values with their intervals, each over its value."""
+        """A matplotlib figure: the fitted values with their intervals, each over its value; `InputError` if all were held."""
+        if not self.fitted:
+            raise InputError("the fit has no fitted parameter: all were held, and there is no interval to draw")
         return shown(estimate_figure({name: self.estimates[name] for name in self.fitted}))
 
     def _title(self) -> str:

@@ -52,7 +52,7 @@ def laboratory_findings(fit: LaboratoryFit) -> list[str]:
                 f"Held out, {_called(replay)}: predicted with an error of {replay.error_q:.1%} in q and "
                 f"{replay.error_second:.1%} in {_second(replay.test.drained)}."
             )
-    if fit.law_name in CONES:
+    if fit.law_name in CONES and fit.law_name != "drucker_prager_cap":  # there the cap may yield first
         out += friction_words(fit.values["theta_f"], fit.values["C_0"])
     for e in fit.estimates.values():
         if e.note and e.note != "held":
@@ -152,11 +152,13 @@ def _page(fit: LaboratoryFit, signs: Signs, files: list[str]) -> str:
         "Effective stress paths. q is √(3 J₂) in triaxial tests; the √J₂ of the law is q/√3.",
         picture(path_figure(fit, signs)),
     )
-    intervals = figure_html(
-        "intervals",
-        f"The fitted values with their intervals ({fit.confidence:.0%}), over themselves.",
-        picture(estimate_figure({name: fit.estimates[name] for name in fit.fitted})),
-    )
+    intervals = ""
+    if fit.fitted:
+        intervals = figure_html(
+            "intervals",
+            f"The fitted values with their intervals ({fit.confidence:.0%}), over themselves.",
+            picture(estimate_figure({name: fit.estimates[name] for name in fit.fitted})),
+        )
     listed = "".join(f"<li><code>{escape(name)}</code></li>" for name in files)
     parts = [
         f"<h1>{TITLE}</h1>",
