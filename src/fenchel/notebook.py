@@ -132,15 +132,16 @@ def field_cells(name: str, unit: str, value: Any) -> tuple[str, str, str, str]:
     if isinstance(value, (tuple, list)) and not all(isinstance(x, (int, float)) for x in value):
         kinds = list(dict.fromkeys(x if isinstance(x, str) else type(x).__name__ for x in value))
         return name, unit, _entries(len(value)), _shortened(", ".join(kinds))
-    if hasattr(value, "dtype") and value.dtype.kind not in "fiub":
-        return name, unit, " × ".join(map(str, value.shape)), str(value.dtype)
-    if hasattr(value, "dtype") or isinstance(value, (tuple, list)):
+    kind: Any = getattr(value, "dtype", None)
+    if kind is not None and kind.kind not in "fiub":
+        return name, unit, " × ".join(map(str, getattr(value, "shape", ()))), str(kind)
+    if kind is not None or isinstance(value, (tuple, list)):
         cells = array_cells(name, unit, value)
         few = getattr(value, "ndim", 1) == 1 and 0 < len(value) <= FEW
         return (*cells[:3], ", ".join(f"{float(x):.6g}" for x in value)) if few else cells
-    title = getattr(value, "_title", None)
+    title: Any = getattr(value, "_title", None)
     if callable(title):
-        return name, unit, "", _shortened(title())
+        return name, unit, "", _shortened(str(title()))
     if dataclasses.is_dataclass(value):
         return name, unit, "", type(value).__name__
     return name, unit, "", _shortened((str(value).splitlines() or [""])[0])

@@ -43,7 +43,8 @@ def estimate_figure(estimates: Mapping[str, Any]) -> Any:
     for k, e in enumerate(shown):
         bounded = isfinite(e.low) and isfinite(e.high)
         if e.value and bounded:
-            _bar(axis, k, *sorted((e.low / e.value, e.high / e.value)), reach)
+            low, high = sorted((e.low / e.value, e.high / e.value))
+            _bar(axis, k, low, high, reach)
         if e.value:
             single = [
                 min(max(x / e.value, 1.0 - reach), 1.0 + reach) for x in getattr(e, "seed_values", ()) if isfinite(x)

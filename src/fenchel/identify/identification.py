@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from time import perf_counter
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,7 +14,8 @@ from ..drawing import Signs, shown
 from ..errors import ConvergenceError, InputError
 from ..notebook import Summary
 from .curves import Curves, curves
-from .estimate_view import HEADS, estimate_figure, estimate_rows
+from .estimate_view import HEADS as ESTIMATE_HEADS
+from .estimate_view import estimate_figure, estimate_rows
 from .findings import findings
 from .fit import UNITS, LawFit, fit_law, scalars
 from .interval import Estimate, estimate
@@ -64,7 +65,7 @@ class Identification(Summary):
     failed_replicas: int  # octant replicas whose fit did not converge (left out of the spread)
     seconds: float
 
-    HEADS = HEADS
+    HEADS: ClassVar[tuple[str, ...]] = ESTIMATE_HEADS
 
     def plot(self, *, signs: str = "tension-positive") -> Any:
         """A matplotlib figure: every test and the law that was identified. `InputError` for other `signs` than "tension-positive" and

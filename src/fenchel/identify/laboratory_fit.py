@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from math import inf, isfinite
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,8 @@ from numpy.typing import NDArray
 from ..drawing import Signs, shown
 from ..errors import InputError
 from ..notebook import Summary
-from .estimate_view import HEADS, estimate_figure, estimate_rows
+from .estimate_view import HEADS as ESTIMATE_HEADS
+from .estimate_view import estimate_figure, estimate_rows
 from .laboratory_file import LaboratoryTest
 from .laboratory_interval import LaboratoryEstimate, estimates_of, leave_one_out
 from .laboratory_problem import LaboratoryProblem, relative_scales
@@ -63,7 +64,7 @@ class LaboratoryFit(Summary):
     confidence: float
     volume_weight: float
 
-    HEADS = HEADS
+    HEADS: ClassVar[tuple[str, ...]] = ESTIMATE_HEADS
 
     def plot(self, *, signs: str = "compression-positive") -> Any:
         """A matplotlib figure: q, volume strain and pore pressure against the axial strain, measured and by the law. `InputError` for
