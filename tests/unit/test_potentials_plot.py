@@ -197,9 +197,23 @@ def test_show_refuses_what_has_no_meaning(tmp_path, capsys):
     assert ".png or .svg" in capsys.readouterr().err
     assert cli.main(["show", "tresca", *TRESCA]) == 2
     assert "--plot" in capsys.readouterr().err
-    assert cli.main(["show", "tresca", "--plot", str(tmp_path / "a.png")]) == 2
-    assert "have no value" in capsys.readouterr().err
     assert not list(tmp_path.iterdir())
+    # only laws of the library have values of their own
+    (tmp_path / "laws.py").write_text("from fenchel.potentials.library import tresca as own\n")
+    assert cli.main(["show", f"{tmp_path / 'laws.py'}:own", "--plot", str(tmp_path / "a.png")]) == 2
+    assert "have no value" in capsys.readouterr().err and not (tmp_path / "a.png").exists()
+
+
+@pytest.mark.parametrize("name", ["tresca", "thermo_elasto_plastic"])
+def test_a_law_of_the_library_is_drawn_with_its_values(tmp_path, capsys, name):
+    entry = ENTRIES[name]
+    given = [w for key, value in (entry.values | entry.worked.temperatures).items() for w in ("-p", f"{key}={value!r}")]
+    assert cli.main(["show", name, "--plot", str(tmp_path / "one.svg"), *given]) == 0
+    assert "values of the library" not in capsys.readouterr().err
+    assert cli.main(["show", name, "--plot", str(tmp_path / "other.svg"), *given[:2]]) == 0
+    err = capsys.readouterr().err
+    assert "values of the library" in err and f"{given[1].partition('=')[0]} = " not in err
+    assert (tmp_path / "one.svg").read_bytes() == (tmp_path / "other.svg").read_bytes()
 
 
 def test_sections_are_the_same_wherever_the_package_is_asked_for_them():

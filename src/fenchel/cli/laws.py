@@ -89,7 +89,10 @@ def _show(
     latex: bool = typer.Option(False, "--latex", help="Print LaTeX."),
     json_wanted: bool = typer.Option(False, "--json", help="Print JSON."),
     plot: Path | None = typer.Option(
-        None, "--plot", metavar="FILE.png|svg", help="Draw the surfaces and energies at the values of -p."
+        None,
+        "--plot",
+        metavar="FILE.png|svg",
+        help="Draw the surfaces and energies at the values of -p; those of a law of the library have defaults.",
     ),
     pairs: list[str] = VALUES,
     parameters: Path | None = PARAMETERS,
@@ -108,6 +111,8 @@ def _show(
 
     Example: fenchel show sand --formulation strain
 
+    Example: fenchel show texsol --plot texsol.png
+
     Example: fenchel show tresca --plot tresca.png -p E=2e11 -p nu=0.3 -p sigma_y=3e8 -p H_i=0
     """
     from fenchel.errors import InputError
@@ -125,12 +130,21 @@ def _show(
     table = declared.table(formulation.value, split=split.value)
     if plot is not None:
         from fenchel.potentials.law_figure import law_figure
+        from fenchel.potentials.library import ENTRIES
 
+        values = parameter_values(pairs, parameters)
+        if law in ENTRIES:
+            usual = ENTRIES[law].values | ENTRIES[law].worked.temperatures
+            missing = {name: value for name, value in usual.items() if name not in values}
+            if missing:
+                told = ", ".join(f"{name} = {value:g}" for name, value in missing.items())
+                typer.echo(f"values of the library, which are plausible and not measured: {told}", err=True)
+            values |= missing
         with waiting(f"drawing law '{declared.name}'"):
             write_figure(
                 law_figure(
                     declared,
-                    parameter_values(pairs, parameters),
+                    values,
                     signs=signs.value,
                     pressure=pressure,
                     measure=measure.value,
