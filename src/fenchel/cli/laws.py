@@ -92,7 +92,7 @@ def _show(
         None,
         "--plot",
         metavar="FILE.png|svg",
-        help="Draw the surfaces and energies at the values of -p; those of a law of the library have defaults.",
+        help="Draw the surfaces and energies at the values of -p (library: its own).",
     ),
     pairs: list[str] = VALUES,
     parameters: Path | None = PARAMETERS,
