@@ -105,7 +105,7 @@ def energy_figure(series: Series) -> Any:
     """Where the external work of one test went, and what is left over; energies from the start of the test."""
     figure, axes = canvas(1, 1, height=3.2)
     axis = axes[0, 0]
-    shades = ("#222222", "#b03a48", "#8c4fa3", "#d1783c", "#1b6ca8", "#3b8f5a", FAINT)
+    shades = ("#222222", "#56B4E9", "#CC79A7", "#D55E00", "#0072B2", "#009E73", FAINT)
     values: Mapping[str, Any] = series.values
     largest = max(float(np.max(np.abs(values[name]))) for name in _ENERGIES if name in values)
     factor, unit = next(

@@ -25,7 +25,7 @@ def sample_figure(view: SampleView) -> Any:
     middle = 0.5 * (x.min(axis=0) + x.max(axis=0))
     left = axes[0, 0]
     distance = np.abs(x[:, 1] - middle[1])
-    for chosen, face, edge in ((wire < 0, "#d9d2c3", "#8f8676"), (wire >= 0, "#1b6ca8", "#12486f")):
+    for chosen, face, edge in ((wire < 0, "#d9d2c3", "#8f8676"), (wire >= 0, "#0072B2", "#12486f")):
         cut = chosen & (distance < r)
         width = 2.0 * np.sqrt(r[cut] ** 2 - distance[cut] ** 2)
         discs = EllipseCollection(

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..drawing import FAINT, INK, canvas, legend_below, styled
+from ..drawing import BLUE, FAINT, GREEN, INK, PURPLE, SKY, VERMILION, canvas, legend_below, styled
 
 __all__ = [
     "buckling_figure", "convergence_figure", "laws_figure", "limit_figure", "motion_figure", "residual_figure", "sweeps_figure",
@@ -17,8 +17,6 @@ __all__ = [
 Array = NDArray[np.float64]
 Results = Mapping[str, Any]
 
-BLUE, ORANGE, GREEN, PURPLE, RED = "#1b6ca8", "#d1783c", "#3b8f5a", "#8c4fa3", "#b03a48"
-
 
 @styled
 def convergence_figure(curves: Results) -> Any:
@@ -26,7 +24,7 @@ def convergence_figure(curves: Results) -> Any:
     figure, axes = canvas(1, 1, height=3.6)
     one = axes[0, 0]
     looks = {
-        "packing, compliant": (BLUE, "-"), "packing, rigid": (ORANGE, "-"), "packing, rigid, no friction": (GREEN, "-"),
+        "packing, compliant": (BLUE, "-"), "packing, rigid": (VERMILION, "-"), "packing, rigid, no friction": (GREEN, "-"),
         "column of 20 spheres": (FAINT, "-"), "chain of 20 beads, rigid": (PURPLE, "-"),
         "chain of 20 beads, k = 10 k_c": (PURPLE, "--"),
     }  # fmt: skip
@@ -56,7 +54,7 @@ def sweeps_figure(bodies: Results, stiffness: Results) -> Any:
     rows, grains = bodies["rows"], bodies["grains"]
     _powers(left, rows, bodies["columns"], INK, "o", "column of rigid spheres")
     _powers(left, rows, bodies["chains"], PURPLE, "s", "hanging chain, rigid wire")
-    _powers(left, grains, bodies["rigid"].mean(axis=1), ORANGE, "o", "packing, rigid grains", bodies["rigid"])
+    _powers(left, grains, bodies["rigid"].mean(axis=1), VERMILION, "o", "packing, rigid grains", bodies["rigid"])
     _powers(left, grains, bodies["compliant"].mean(axis=1), BLUE, "o", "packing, compliant grains", bodies["compliant"])
     guide = np.array([rows[0], rows[-1]], dtype=float)
     left.plot(guide, 0.25 * bodies["columns"][0] * (guide / rows[0]) ** 2, color=FAINT, linestyle=":", label="slope 2")
@@ -97,7 +95,7 @@ def laws_figure(found: Results, stiffness: float, spread: float) -> Any:
         shown = (np.abs(tension) <= 1.75) & (np.abs(strain) <= 1.75)
         one.axhline(0.0, color=FAINT, linewidth=0.6)
         one.axvline(0.0, color=FAINT, linewidth=0.6)
-        one.plot(x, y, color=ORANGE, linewidth=3.5, alpha=0.55, solid_capstyle="butt", label="graph of the law")
+        one.plot(x, y, color=VERMILION, linewidth=3.5, alpha=0.55, solid_capstyle="butt", label="graph of the law")
         one.plot(
             strain[shown],
             tension[shown],
@@ -126,7 +124,7 @@ def limit_figure(limit: Results | None, fold: Results | None) -> Any:
     left, right = axes[0]
     if limit is not None:
         k = limit["ratios"]
-        for name, colour, marker in (("rod", BLUE, "o"), ("wire", ORANGE, "s")):
+        for name, colour, marker in (("rod", BLUE, "o"), ("wire", VERMILION, "s")):
             _powers(left, k, np.exp(np.log(limit[name]).mean(axis=1)), colour, marker, f"elastic {name}", limit[name])
         left.plot(k, 1.0 / k, color=FAINT, linestyle=":", label="slope −1")
         left.set(xscale="log", yscale="log", xlabel="$k/k_c$ [-]", ylabel=r"$\|T_k - T_{rigid}\|/\|T_{rigid}\|$ [-]")
@@ -135,7 +133,9 @@ def limit_figure(limit: Results | None, fold: Results | None) -> Any:
     if fold is not None:
         n = fold["steps"].astype(float)
         right.plot(n, fold["rigid rod"], color=BLUE, marker="o", markersize=5, label="rigid rods")
-        right.plot(n, fold["rigid wire"], color=ORANGE, marker="s", markersize=3, linestyle="none", label="rigid wires")
+        right.plot(
+            n, fold["rigid wire"], color=VERMILION, marker="s", markersize=3, linestyle="none", label="rigid wires"
+        )
         right.plot(n, 0.5 * fold["rigid rod"][0] * (n[0] / n) ** 2, color=FAINT, linestyle=":", label="slope −2")
         right.set(
             xscale="log", yscale="log", xlabel="steps for half a turn [-]", ylabel="share of kinetic energy lost [-]"
@@ -156,7 +156,7 @@ def buckling_figure(found: Results) -> Any:
     shades = matplotlib.colormaps["viridis"](np.linspace(0.75, 0.1, len(found["counts"]) - 1))
     for place, count in enumerate(found["counts"]):
         shift, force = found[f"curve_{count}"]
-        colour, line = (ORANGE, "--") if count == 2 else (shades[place - 1], "-")
+        colour, line = (VERMILION, "--") if count == 2 else (shades[place - 1], "-")
         for one in axes[0]:
             one.plot(100.0 * shift, force, color=colour, linestyle=line, label=f"{count} points")
     for one in axes[0]:
@@ -174,7 +174,7 @@ def residual_figure(found: Results) -> Any:
     figure, axes = canvas(1, 2, height=3.0, sharey=True)
     tolerance = found["tolerances"]
     for one, name in zip(axes[0], ("compliant", "rigid"), strict=True):
-        for k, (label, colour) in enumerate((("median", BLUE), ("90 %", GREEN), ("99 %", ORANGE), ("largest", RED))):
+        for k, (label, colour) in enumerate((("median", BLUE), ("90 %", GREEN), ("99 %", VERMILION), ("largest", SKY))):
             one.plot(tolerance, found[name][:, k], color=colour, marker="o", markersize=3.5, label=label)
         one.plot(tolerance, found[f"total_{name}"], color=INK, linestyle="--", label=r"all, $\|F\|/\|r\|$")
         one.plot(tolerance, tolerance, color=FAINT, linestyle=":", label="equal to the tolerance")
@@ -191,7 +191,7 @@ def motion_figure(flight: Results, swing: Results, hung: Results) -> Any:
     figure, axes = canvas(2, 2, height=2.5)
     bounce, tension, shape, pull = axes.ravel()
     time = flight["interval"] * np.arange(flight["path"].shape[1])
-    for e, path, colour in zip(flight["restitutions"], flight["path"], (INK, BLUE, ORANGE, GREEN), strict=False):
+    for e, path, colour in zip(flight["restitutions"], flight["path"], (INK, BLUE, VERMILION, GREEN), strict=False):
         bounce.plot(1e3 * time, 1e3 * path, color=colour, label=f"e = {e:g}")
     bounce.set(
         xlabel="time [ms]", ylabel="height above the floor [mm]", title="a ball let fall from 100 mm", ylim=(-3, 128)
@@ -202,14 +202,14 @@ def motion_figure(flight: Results, swing: Results, hung: Results) -> Any:
     grid = np.linspace(-swing["start"], swing["start"], 200)
     exact = 3.0 * np.cos(grid) - 2.0 * np.cos(swing["start"])
     tension.plot(
-        np.degrees(grid), exact, color=ORANGE, linewidth=3.5, alpha=0.55, label=r"$3\cos\varphi-2\cos\varphi_0$"
+        np.degrees(grid), exact, color=VERMILION, linewidth=3.5, alpha=0.55, label=r"$3\cos\varphi-2\cos\varphi_0$"
     )
     tension.plot(np.degrees(angle[every]), found[every], "o", color=BLUE, markersize=3, label="rigid rod")
     tension.set(xlabel=r"angle $\varphi$ [°]", ylabel=r"tension / weight [-]", title="pendulum let go at 57°")
     tension.legend(loc="lower center")
     x = hung["exact"]
-    shape.plot(x[:, 0], x[:, 2], color=ORANGE, linewidth=3.5, alpha=0.55, label="statics of the links")
-    pull.plot(1 + np.arange(len(hung["expected"])), hung["expected"], color=ORANGE, linewidth=3.5, alpha=0.55)
+    shape.plot(x[:, 0], x[:, 2], color=VERMILION, linewidth=3.5, alpha=0.55, label="statics of the links")
+    pull.plot(1 + np.arange(len(hung["expected"])), hung["expected"], color=VERMILION, linewidth=3.5, alpha=0.55)
     for name, colour, marker, size in (("rod", BLUE, "o", 4.5), ("wire", INK, "x", 3.5)):
         part = hung[name]
         shape.plot(part["x"][:, 0], part["x"][:, 2], marker, color=colour, markersize=size, label=f"rigid {name}")

@@ -78,7 +78,7 @@ def _edges(middles: Array) -> Array:
 def sign_figure(sets: Mapping[str, Mapping[str, Any]], shapes: Sequence[float]) -> Any:
     """A panel per set of parameters: bands from the lowest to the highest wire pressure."""
     figure, axes = canvas(1, len(sets), height=2.7)
-    shades = ("#d1783c", "#3b8f5a", "#1b6ca8")
+    shades = ("#D55E00", "#009E73", "#0072B2")
     handles: list[Any] = []
     for one, (title, found) in zip(axes[0], sets.items(), strict=True):
         x = 100.0 * found["shortening"]

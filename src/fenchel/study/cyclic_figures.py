@@ -15,7 +15,7 @@ __all__ = ["SHADES", "line_figure", "loop_figure", "sweep_figure"]
 
 Array = NDArray[np.float64]
 
-SHADES = {"sand": "#6b6b2a", "reinforced": "#d1783c", "texsol": "#1b6ca8"}
+SHADES = {"sand": "#E69F00", "reinforced": "#D55E00", "texsol": "#0072B2"}
 MARKS = {"sand": "o", "reinforced": "s", "texsol": "^"}
 LABELS = {
     "ratio": r"$E_w/E_s$ [-]",
@@ -25,7 +25,7 @@ LABELS = {
     "stroke": r"$u/H$ [%]",
 }
 FACTORS = {"H_k": 1e-6, "H_i": 1e-6, "stroke": 100.0}
-LATER = "#d1783c"
+LATER = "#D55E00"
 
 
 @styled
@@ -53,8 +53,8 @@ def _loops(axes: Any, found: Mapping[str, Any]) -> list[Any]:
     count = len(found["low"])
     per = (len(strain) - 1) // count
     (between,) = axes.plot(strain, stress, color="#b9b9b9", linewidth=0.4, zorder=2)
-    (first,) = axes.plot(strain[: per + 1], stress[: per + 1], color="#d1783c", linewidth=1.0, zorder=3)
-    (last,) = axes.plot(strain[-per - 1 :], stress[-per - 1 :], color="#1b6ca8", linewidth=1.6, zorder=4)
+    (first,) = axes.plot(strain[: per + 1], stress[: per + 1], color="#D55E00", linewidth=1.0, zorder=3)
+    (last,) = axes.plot(strain[-per - 1 :], stress[-per - 1 :], color="#0072B2", linewidth=1.6, zorder=4)
     (dot,) = axes.plot(
         100.0 * found["residual"][-1], 0.0, "o", color=INK, markersize=4, markeredgecolor="white", linestyle="none", zorder=5
     )  # fmt: skip

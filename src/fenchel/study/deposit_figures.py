@@ -17,7 +17,7 @@ __all__ = ["box_view", "fabric_history", "heap_view", "length_figure", "profile_
 
 Array = NDArray[np.float64]
 
-SHADES = {"linked": "#1b6ca8", "unlinked": "#d1783c", "sand": "#6b6b2a"}
+SHADES = {"linked": "#0072B2", "unlinked": "#D55E00", "sand": "#E69F00"}
 
 
 def _wires(axes: Any, network: Network, *, across: tuple[int, ...], scale: float = 1e3) -> Any:
@@ -58,7 +58,7 @@ def heap_view(assembly: Assembly, network: Network) -> Any:
     for chosen, face in (
         (fixed, "#c9c9c9"),
         (~fixed & (assembly.wire < 0), "#d9d2c3"),
-        (assembly.wire >= 0, "#1b6ca8"),
+        (assembly.wire >= 0, "#0072B2"),
     ):
         cut = chosen & (distance < r)
         width = 2.0 * np.sqrt(r[cut] ** 2 - distance[cut] ** 2)

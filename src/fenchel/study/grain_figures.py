@@ -43,18 +43,18 @@ def macro_figure(k: Array, slopes: Sequence[Mean], rigid: Mean, limit: tuple[flo
     one = axes[0, 0]
     values = np.array([m.value for m in slopes]) / 1e3
     half = np.array([m.half if np.isfinite(m.low) else 0.0 for m in slopes]) / 1e3
-    one.errorbar(k, values, yerr=half, fmt="o", color="#1b6ca8", markersize=4, capsize=2, label="elastic wires")
+    one.errorbar(k, values, yerr=half, fmt="o", color="#0072B2", markersize=4, capsize=2, label="elastic wires")
     grid = np.geomspace(k[0] / 2, k[-1] * 4, 100)
     one.plot(
         grid,
         1e-3 / (1.0 / limit[0] + 1.0 / (limit[1] * grid)),
-        color="#1b6ca8",
+        color="#0072B2",
         linewidth=0.9,
         label="1/E = 1/E∞ + 1/(ηk)",
     )
     if np.isfinite(rigid.low):
-        one.axhspan(rigid.low / 1e3, rigid.high / 1e3, color="#d1783c", alpha=0.2, linewidth=0)
-    one.axhline(rigid.value / 1e3, color="#d1783c", label="rigid wire")
+        one.axhspan(rigid.low / 1e3, rigid.high / 1e3, color="#D55E00", alpha=0.2, linewidth=0)
+    one.axhline(rigid.value / 1e3, color="#D55E00", label="rigid wire")
     one.axvline(critical, color=FAINT, linestyle=":", label="k_c")
     one.set_xscale("log")
     one.set(xlabel="wire stiffness k [N]", ylabel=r"slope of $\sqrt{J_2}$ (links) [kPa]", ylim=(0.0, None))
@@ -75,16 +75,16 @@ def bead_figure(found: Mapping[float, Sequence[Any]]) -> Any:
         low, high = np.array([p.low for p in rows]), np.array([p.high for p in rows])
         bars = np.clip(np.stack([value - low, high - value]), 0.0, None)
         mismatch.errorbar(
-            ratios * (1 + 0.02 * k), value, yerr=bars, fmt="o", color="#1b6ca8", markersize=3, capsize=2, linewidth=0.8
+            ratios * (1 + 0.02 * k), value, yerr=bars, fmt="o", color="#0072B2", markersize=3, capsize=2, linewidth=0.8
         )
-        slip.plot(ratios, [p.slip for p in rows], "o", color="#1b6ca8", markersize=3)
-        share.plot(ratios, [100 * p.sliding for p in rows], "o", color="#1b6ca8", markersize=3)
+        slip.plot(ratios, [p.slip for p in rows], "o", color="#0072B2", markersize=3)
+        share.plot(ratios, [100 * p.sliding for p in rows], "o", color="#0072B2", markersize=3)
     for one, name in ((slip, "slip"), (share, "sliding")):
         scale = 100.0 if name == "sliding" else 1.0
         one.plot(
             ratios,
             [scale * np.mean([getattr(p, name) for p in found[r]]) for r in ratios],
-            color="#1b6ca8",
+            color="#0072B2",
             linewidth=0.9,
         )
     mismatch.axhline(noise, color=FAINT, linestyle="--", linewidth=0.9, label="two halves of the grains")

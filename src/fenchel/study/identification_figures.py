@@ -27,9 +27,9 @@ def table_figure(table: Mapping[str, Array]) -> Any:
     grid = np.array([4e4, 1e5])
     one.plot(P / 1e5, tau / 1e3, "o", color="#222222", label="Table 3 of the study")
     lines = (
-        ("published: 0.079 rad, 2842 Pa", 2842.0, np.tan(0.079), "#1b6ca8", "-"),
-        ("least absolute deviations", *_line(least_absolute_line(P, tau)), "#d1783c", "--"),
-        ("least squares", *_line(least_squares_line(P, tau)), "#3b8f5a", "-."),
+        ("published: 0.079 rad, 2842 Pa", 2842.0, np.tan(0.079), "#0072B2", "-"),
+        ("least absolute deviations", *_line(least_absolute_line(P, tau)), "#D55E00", "--"),
+        ("least squares", *_line(least_squares_line(P, tau)), "#009E73", "-."),
         ("least squares without 0.9 bar", *_line(least_squares_line(P[:-1], tau[:-1])), FAINT, ":"),
     )
     for name, foot, slope, shade, style in lines:
@@ -84,7 +84,7 @@ def replay_figure(size: Size, folder: Path, identification: Mapping[str, Any]) -
         found = predict(test, law, replay, seed=1, linked=True, held_out=p in size.held_out)
         along = walked(found.axial_strain)
         one.plot(along, found.q / 1e3, color="#8a8a8a", label="grains and wires")
-        one.plot(along, found.q_law / 1e3, color="#1b6ca8", label="law")
+        one.plot(along, found.q_law / 1e3, color="#0072B2", label="law")
         kind = "held out" if p in size.held_out else "fitted"
         one.set(xlabel="axial strain walked [%]", title=f"{p / 1e3:g} kPa, {kind}: {100 * found.error_q:.1f} % rms")
     axes[0, 0].set(ylabel=r"$q=\sigma_r-\sigma_z$ [kPa]")
