@@ -105,6 +105,7 @@ def test_locked_sphere_sticks_below_the_angle_of_friction_and_slides_above() -> 
         assert simulation.kernels.turning == "none" and a.spin.shape == (1, 0)
 
 
+@pytest.mark.validate
 def test_no_creep_in_a_hundred_thousand_steps() -> None:
     """Rigid and compliant: below the angle of friction the sphere stays where the first steps have put it."""
     for law in (SignoriniCoulomb(friction=0.4), CompliantSignoriniCoulomb(friction=0.4, k_n=1e5, k_t=8e4)):
