@@ -105,4 +105,6 @@ def _energies(ax: Any, history: History) -> None:
     ax.set(
         xlabel=r"strain walked, $\int\Vert\mathrm{d}\varepsilon\Vert$ [%]", ylabel=f"energy [{unit}]", title="Energies"
     )
-    ax.legend(loc="best")
+    low, high = ax.get_ylim()
+    ax.set_ylim(low, high + 0.35 * (high - low))  # room for the legend above the curves
+    ax.legend(loc="upper left")
